@@ -1,8 +1,8 @@
-#include <cmath>
 #include <set>
 #include <span>
 
 #include "proto/rig/bones.hpp"
+#include "proto/rig/cut.hpp"
 
 namespace posed::rig {
 namespace {
@@ -190,58 +190,10 @@ Pieces pieces_of(const Figure& figure, const std::vector<JointName>& names, int 
   return out;
 }
 
-// Where a limb begins, bends and ends, among its pieces.
-struct Cut {
-  std::size_t begin = 0, bend = 0, end = 0;
-};
-
-// A limb is two bones nearly as long as each other. Of several cuts the one at which the zero pose
-// bends counts, else the one nearest to equal halves; where no name says the end, the longest.
-std::optional<Cut> cut_of(const Figure& figure, const Pieces& pieces, bool is_leg) {
-  constexpr double kBent_deg = 8;
-  constexpr double kBend = 0.3;
-  constexpr std::size_t kMaxPieces = 16;
-  const std::size_t count = pieces.size();
-  if (count > kMaxPieces) return std::nullopt;
-  const auto way = [&](std::size_t from, std::size_t to) {
-    return figure.between(pieces.joint[from], pieces.joint[to]).value_or(Vec::Zero());
-  };
-  // Along the pieces: whether the first is a shoulder does not depend on how it bends.
-  const auto length = [&](std::size_t from, std::size_t to) {
-    double sum = 0.0;
-    for (std::size_t i = from; i < to; ++i) sum += way(i, i + 1).norm();
-    return sum;
-  };
-  constexpr double kWidest = 1.5;  // of the longer bone to the other
-  constexpr double kToes = 0.6;    // of the shin at most
-  for (std::size_t begin = 0; begin + 2 < count; ++begin) {
-    std::optional<Cut> best;
-    double best_score = -1e300;
-    for (std::size_t end = pieces.has_end ? count - 1 : begin + 2; end < count; ++end) {
-      for (std::size_t bend = begin + 1; bend < end; ++bend) {
-        const double upper = length(begin, bend);
-        const double lower = length(bend, end);
-        const double unequal = std::max(upper, lower) / std::max(std::min(upper, lower), 1e-9);
-        if (unequal > kWidest) continue;
-        if (is_leg && way(end, count - 1).norm() > kToes * lower) continue;
-        const double bent_deg = angle_deg(way(bend - 1, bend), way(bend, bend + 1));
-        // Behind a foot there may be toes.
-        const double longer = is_leg ? 0.0 : std::log(upper + lower);
-        const double score = longer - std::log(unequal) + (bent_deg > kBent_deg ? kBend : 0.0);
-        if (score <= best_score) continue;
-        best_score = score;
-        best = Cut{.begin = begin, .bend = bend, .end = end};
-      }
-    }
-    if (best) return best;
-  }
-  return std::nullopt;
-}
-
 // Where names say no more of a limb than its pieces, their lengths tell the bones. `upper` is the
-// upper one's place in the chain.
+// upper one's place in the chain; `leg` the length of a leg's bones, if it is known.
 void settle_pieces(const Figure& figure, const std::vector<JointName>& names, std::size_t upper,
-                   std::array<int, kSlots>& chain) {
+                   double leg, std::array<int, kSlots>& chain) {
   const int first = chain[upper];
   const int lower = chain[upper + 1];
   if (first < 0 || lower < 0 || names[first].stem != names[lower].stem) return;
@@ -252,7 +204,8 @@ void settle_pieces(const Figure& figure, const std::vector<JointName>& names, st
     if (next >= 0) pieces.joint.push_back(next);
   }
   const bool is_leg = upper == 0;
-  const auto cut = cut_of(figure, pieces, is_leg);
+  const CutLimb limb(figure, pieces.joint, pieces.has_end);
+  const auto cut = is_leg ? limb.as_leg() : limb.as_arm(leg);
   if (!cut) return;
   const int end = pieces.joint[cut->end];
   chain[upper] = pieces.joint[cut->begin];
@@ -268,6 +221,7 @@ void settle_pieces(const Figure& figure, const std::vector<JointName>& names, st
 
 void find_limbs(const Figure& figure, const std::vector<JointName>& names, BoneJoints& bones) {
   const auto copies = copies_in(names);
+  double leg = 0.0;
   const auto find = [&](Side side, Bone first, auto fit_of,
                         const std::array<bool, kSlots>& needed) {
     const NameSide wanted = side == Side::kLeft ? NameSide::kLeft : NameSide::kRight;
@@ -283,13 +237,17 @@ void find_limbs(const Figure& figure, const std::vector<JointName>& names, BoneJ
     const std::size_t end = first == Bone::kLeftUpperLeg ? 2 : 3;  // foot or hand
     drop_marks(figure, end, fits);
     auto chain = best_chain(figure, fits, needed);
-    settle_pieces(figure, names, first == Bone::kLeftUpperLeg ? 0 : 1, chain);
+    settle_pieces(figure, names, first == Bone::kLeftUpperLeg ? 0 : 1, leg, chain);
     if (chain[end - 1] >= 0 && chain[end] < 0) {
       chain[end] = next_of_limb(figure, names, chain[end - 1], end == 2 ? chain[3] : -1);
     }
     if (end == 2 && chain[2] >= 0) {
       chain[3] = chain[3] < 0 ? toes_of(figure, names, chain[2])
                               : ball_of_foot(figure, fits, chain[2], chain[3]);
+    }
+    if (end == 2 && *std::ranges::min_element(std::span(chain).first(3)) >= 0) {
+      leg = figure.between(chain[0], chain[1]).value_or(Vec::Zero()).norm() +
+            figure.between(chain[1], chain[2]).value_or(Vec::Zero()).norm();
     }
     for (std::size_t k = 0; k < kSlots; ++k) {
       bones.set(on(side, static_cast<Bone>(static_cast<std::size_t>(first) + k)), chain[k]);

@@ -1,7 +1,7 @@
 #include <cmath>
-#include <numeric>
 
 #include "proto/rig/bones.hpp"
+#include "proto/rig/cut.hpp"
 
 namespace posed::rig {
 namespace {
@@ -15,161 +15,16 @@ constexpr std::array kLeg{Bone::kLeftUpperLeg, Bone::kLeftLowerLeg, Bone::kLeftF
 constexpr std::array kArm{Bone::kLeftShoulder, Bone::kLeftUpperArm, Bone::kLeftLowerArm,
                           Bone::kLeftHand};
 
-// The first segments, as far as both sides' are alike: behind them a hand may hold a prop.
-std::vector<double> shared_segments(const std::vector<double>& one,
-                                    const std::vector<double>& other) {
-  constexpr double kAlike = 0.75;
-  constexpr std::size_t kMinAlike = 3;
-  std::vector<double> out;
-  for (std::size_t i = 0; i < std::min(one.size(), other.size()); ++i) {
-    const auto [less, more] = std::minmax(one[i], other[i]);
-    if (i >= kMinAlike && less < kAlike * more) break;
-    out.push_back(less);
-  }
-  return out;
-}
-
-// Where the longest two consecutive segments of a limb begin: thigh and shin, upper and lower arm.
-// Clavicles come before an arm, so of nearly equal ones the last counts there.
-std::size_t long_bones(const std::vector<double>& segments, bool arm) {
-  std::size_t first = 0;
-  double longest = 0.0;
-  for (std::size_t i = 0; i + 1 < segments.size(); ++i) {
-    longest = std::max(longest, std::min(segments[i], segments[i + 1]));
-  }
-  for (std::size_t i = 0; i + 1 < segments.size(); ++i) {
-    if (std::min(segments[i], segments[i + 1]) > (arm ? 0.8 : 0.999) * longest) first = i;
-  }
-  return first;
-}
-
-double two_bones(const std::vector<double>& segments, bool arm) {
-  if (segments.size() < 2) return 0.0;
-  const std::size_t first = long_bones(segments, arm);
-  return segments[first] + segments[first + 1];
-}
-
-constexpr double kArmOfLeg = 0.63;    // upper and lower arm, of thigh and shin
 constexpr double kTrunkOfLeg = 0.45;  // from where the legs begin to where the arms do
-
-double unlike(double one, double other) {
-  return std::abs(std::log(std::max(one, 1e-9) / std::max(other, 1e-9)));
-}
-
-// Where a limb's upper bone begins, where it bends and where its lower bone ends: numbers of the
-// joints in its chain.
-struct TwoBones {
-  std::size_t begin = 0, bend = 1, end = 2;
-  double length = 0.0;
-};
-
-// A limb of a pair whose bones are cut by joints that only twist.
-class CutLimb {
- public:
-  CutLimb(const Figure& figure, int one, int other)
-      : chain_(figure.main_chain(one)), to_first_(figure[one].offset.norm()) {
-    const auto a = figure.segments(chain_);
-    const auto b = figure.segments(figure.main_chain(other));
-    chain_.resize(std::min({a.size(), b.size(), kMaxJoints}));
-    at_.push_back(0.0);
-    for (std::size_t i = 0; i < chain_.size(); ++i) at_.push_back(at_[i] + std::min(a[i], b[i]));
-    for (std::size_t i = 1; i + 1 < chain_.size(); ++i) {
-      const double bent = angle_deg(figure[chain_[i]].offset, figure[chain_[i + 1]].offset);
-      bends_.push_back(at_[i + 1] > at_[i] && bent > kBent_deg);
-    }
-  }
-
-  // The cut that is likest a person's: two bones about as long as each other, straight, with what
-  // is left for a hand or a foot behind them. `leg`: the leg's length for an arm; 0 for a leg.
-  [[nodiscard]] std::optional<TwoBones> best(double leg) const {
-    std::optional<TwoBones> found;
-    double least = kMaxCost;
-    for (std::size_t begin = 0; begin + 2 < chain_.size(); ++begin) {
-      for (std::size_t bend = begin + 1; bend + 1 < chain_.size(); ++bend) {
-        for (std::size_t end = bend + 1; end < chain_.size(); ++end) {
-          const TwoBones two{begin, bend, end, way(begin, end)};
-          const double cost = cost_of(two, leg);
-          if (cost >= least) continue;
-          least = cost;
-          found = two;
-        }
-      }
-    }
-    return found;
-  }
-
- private:
-  static constexpr std::size_t kMaxJoints = 12;
-  static constexpr double kBent_deg = 8.0;
-  static constexpr double kMaxCost = 1.5;
-
-  [[nodiscard]] double way(std::size_t from, std::size_t to) const { return at_[to] - at_[from]; }
-
-  // How far a length is from what is usual, as a logarithm beyond what people differ by.
-  static double off(double length, double usual, double differ) {
-    return std::max(0.0, unlike(length, usual) - differ);
-  }
-
-  [[nodiscard]] double cost_of(const TwoBones& two, double leg) const {
-    double cost = unlike(way(two.begin, two.bend), way(two.bend, two.end));
-    for (std::size_t i = two.begin + 1; i < two.end; ++i) {
-      if (i != two.bend && bends_[i - 1]) cost += 0.5;
-    }
-    const double rest = at_.back() - at_[two.end];
-    if (leg <= 0.0) {
-      cost += rest > 0.0 ? 0.5 * off(rest, 0.25 * two.length, 0.4) : 0.5;
-      return cost + at_[two.begin] / two.length;
-    }
-    cost += unlike(two.length, kArmOfLeg * leg);
-    cost += rest > 0.0 ? 0.3 * off(rest, 0.2 * leg, 0.7) : 0.1;
-    return cost + 0.7 * off(to_first_ + at_[two.begin], 0.3 * leg, 0.3);  // across the shoulders
-  }
-
-  std::vector<int> chain_;
-  double to_first_ = 0.0;    // from the trunk
-  std::vector<double> at_;   // [joint of the chain, then its end] along the limb
-  std::vector<bool> bends_;  // [joint of the chain but the first and the last]
-};
-
-// Whether two consecutive segments are too unlike for a limb's two bones: their maker cut one.
-bool are_unequal(const std::vector<double>& segments, std::size_t first) {
-  constexpr double kMostUnequal = 0.5;  // as a logarithm
-  return first + 1 < segments.size() && unlike(segments[first], segments[first + 1]) > kMostUnequal;
-}
-
-// The same, or too short.
-bool are_cut(const std::vector<double>& segments, std::size_t first) {
-  constexpr double kLeastPart = 0.6;
-  if (first + 1 >= segments.size()) return false;
-  const double all = std::accumulate(segments.begin(), segments.end(), 0.0);
-  return segments[first] + segments[first + 1] < kLeastPart * all || are_unequal(segments, first);
-}
-
-// Where the upper arm is among an arm's segments. Two that are longer than a leg are what the hand
-// holds.
-std::size_t upper_arm(const std::vector<double>& segments, double leg) {
-  std::size_t first = long_bones(segments, true);
-  if (segments.size() < 2 || two_bones(segments, true) <= leg) return first;
-  double least = 1e300;
-  for (std::size_t i = 0; i + 1 < segments.size(); ++i) {
-    const double off = unlike(segments[i] + segments[i + 1], kArmOfLeg * leg) +
-                       unlike(segments[i], segments[i + 1]);
-    if (off >= least) continue;
-    least = off;
-    first = i;
-  }
-  return first;
-}
 
 // Two chains that begin at one joint and are as long as each other, as far as a limb goes: a hand
 // may hold a prop.
 struct Pair {
   double length = 0.0;
-  double as_leg = 0.0, as_arm = 0.0;  // of its two long bones
   int parent = 0;
-  int one = 0, other = 0;       // where the chains begin
-  bool unequal_arm = false;     // its two long bones are no upper and lower arm
-  std::optional<TwoBones> cut;  // of a leg whose bones are cut
+  int one = 0, other = 0;  // where the chains begin
+  CutLimb limb;
+  TwoBones as_leg;
 };
 
 std::optional<Pair> mirrored(const Figure& figure, int parent, int one, int other) {
@@ -189,25 +44,15 @@ std::optional<Pair> mirrored(const Figure& figure, int parent, int one, int othe
   }
   const double apart = std::abs(figure[one].offset.norm() - figure[other].offset.norm());
   if (!(length > 0.0) || gap >= 0.15 * length || apart >= 0.15 * length) return std::nullopt;
-  const auto both = shared_segments(a, b);
-  Pair pair{.length = length,
-            .as_leg = two_bones(both, false),
-            .as_arm = two_bones(both, true),
-            .parent = parent,
-            .one = one,
-            .other = other,
-            .unequal_arm = are_unequal(both, long_bones(both, true)),
-            .cut = {}};
-  if (are_cut(both, long_bones(both, false))) {
-    pair.cut = CutLimb(figure, one, other).best(0.0);
-    if (pair.cut) pair.as_leg = pair.cut->length;
-  }
-  return pair;
-}
-
-// Whether the longest two segments cannot be an arm's bones, of a leg of this length.
-bool is_cut_arm(const Pair& arms, double leg) {
-  return arms.unequal_arm || arms.as_arm < 0.8 * kArmOfLeg * leg;
+  CutLimb limb(figure, one, other);
+  const auto leg = limb.as_leg();
+  if (!leg) return std::nullopt;
+  return Pair{.length = length,
+              .parent = parent,
+              .one = one,
+              .other = other,
+              .limb = std::move(limb),
+              .as_leg = *leg};
 }
 
 std::vector<Pair> find_pairs(const Figure& figure) {
@@ -217,13 +62,14 @@ std::vector<Pair> find_pairs(const Figure& figure) {
     const int count = std::min(static_cast<int>(children.size()), kMaxSiblings);
     for (int a = 0; a < count; ++a) {
       for (int b = a + 1; b < count; ++b) {
-        if (const auto pair = mirrored(figure, j, children[a], children[b])) pairs.push_back(*pair);
+        auto pair = mirrored(figure, j, children[a], children[b]);
+        if (pair) pairs.push_back(std::move(*pair));
       }
     }
   }
   if (pairs.size() > kMaxPairs) {
     std::ranges::stable_sort(pairs, std::greater{}, &Pair::length);
-    pairs.resize(kMaxPairs);
+    pairs.erase(pairs.begin() + kMaxPairs, pairs.end());
   }
   return pairs;
 }
@@ -288,25 +134,16 @@ double person_score(const Figure& figure, const Pair& legs, const Pair& arms) {
   const int common = figure.common({legs.parent, arms.parent});
   const Vec trunk = figure.between(common, arms.parent).value_or(Vec::Zero()) -
                     figure.between(common, legs.parent).value_or(Vec::Zero());
-  const double as_arm = arms.cut && is_cut_arm(arms, legs.as_leg) ? arms.cut->length : arms.as_arm;
-  const double arm = std::max(0.0, unlike(as_arm, kArmOfLeg * legs.as_leg) - kArmsDiffer);
-  const double body =
-      std::clamp(unlike(trunk.norm(), kTrunkOfLeg * legs.as_leg) - kTrunksDiffer, 0.0, 1.0);
+  const double leg = legs.as_leg.length;
+  const double as_arm = arms.limb.as_arm(leg)->length;
+  const double arm = std::max(0.0, unlike(as_arm, kArmOfLeg * leg) - kArmsDiffer);
+  const double body = std::clamp(unlike(trunk.norm(), kTrunkOfLeg * leg) - kTrunksDiffer, 0.0, 1.0);
   const double off = 0.3 * branched_off(figure, legs, arms) + 1e-3 * figure.depth(legs.parent);
-  return legs.as_leg * std::exp(-(arm + body + off));
+  return leg * std::exp(-(arm + body + off));
 }
 
-// `leg`: length of the legs' two bones.
-void set_limb(const Figure& figure, const Pair& pair, bool arm, double leg, BoneJoints& bones) {
-  const auto one = figure.segments(figure.main_chain(pair.one));
-  const auto other = figure.segments(figure.main_chain(pair.other));
-  const auto both = shared_segments(one, other);
-  const std::size_t first = arm ? upper_arm(both, leg) : long_bones(both, false);
-  TwoBones two{.begin = first, .bend = first + 1, .end = first + 2};
-  if (!arm && pair.cut) two = *pair.cut;
-  if (arm && is_cut_arm(pair, leg)) {
-    two = CutLimb(figure, pair.one, pair.other).best(leg).value_or(two);
-  }
+void set_limb(const Figure& figure, const Pair& pair, bool arm, const TwoBones& two,
+              BoneJoints& bones) {
   const std::array<std::size_t, 4> at =  // wraps where an arm has no clavicle
       arm ? std::array{two.begin - 1, two.begin, two.bend, two.end}
           : std::array{two.begin, two.bend, two.end, two.end + 1};
@@ -438,7 +275,7 @@ std::optional<BoneJoints> limbs_by_shape(const Figure& figure, const std::vector
   if (legs == nullptr) return std::nullopt;
   BoneJoints bones;
   set_limb(figure, *legs, false, legs->as_leg, bones);
-  set_limb(figure, *arms, true, legs->as_leg, bones);
+  set_limb(figure, *arms, true, *arms->limb.as_arm(legs->as_leg.length), bones);
   if (!bones.has_limbs()) return std::nullopt;
   settle_sides(figure, names, bones, sides_by);
   return bones;

@@ -1,0 +1,108 @@
+#include "proto/rig/cut.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace posed::rig {
+namespace {
+
+constexpr std::size_t kMaxCutJoints = 12;
+
+// How far a length is from what is usual, beyond what people differ by.
+double off(double length, double usual, double differ) {
+  return std::max(0.0, unlike(length, usual) - differ);
+}
+
+// Files say little of what is behind a limb's bones: too little costs at most `unknown`.
+double off_rest(double rest, double usual, double differ, double unknown) {
+  const double cost = off(rest, usual, differ);
+  return rest < usual ? std::min(cost, unknown) : cost;
+}
+
+}  // namespace
+
+double unlike(double one, double other) {
+  return std::abs(std::log(std::max(one, 1e-9) / std::max(other, 1e-9)));
+}
+
+CutLimb::CutLimb(const Figure& figure, int one, int other)
+    : chain_(figure.main_chain(one)),
+      to_first_((figure[one].offset - figure[other].offset).norm() / 2) {
+  auto segments = figure.segments(chain_);
+  const auto others = figure.segments(figure.main_chain(other));
+  segments.resize(std::min({segments.size(), others.size(), kMaxCutJoints}));
+  for (std::size_t i = 0; i < segments.size(); ++i) segments[i] = std::min(segments[i], others[i]);
+  chain_.resize(segments.size());
+  measure(figure, segments);
+}
+
+CutLimb::CutLimb(const Figure& figure, std::vector<int> chain, bool has_end)
+    : chain_(std::move(chain)), has_end_(has_end && chain_.size() <= kMaxCutJoints) {
+  chain_.resize(std::min(chain_.size(), kMaxCutJoints));
+  std::vector<double> segments;
+  for (std::size_t i = 1; i < chain_.size(); ++i) {
+    segments.push_back(figure.between(chain_[i - 1], chain_[i]).value_or(Vec::Zero()).norm());
+  }
+  double behind = 0.0;
+  for (const double s : figure.segments(figure.main_chain(chain_.back()))) behind += s;
+  segments.push_back(behind);
+  measure(figure, segments);
+}
+
+void CutLimb::measure(const Figure& figure, const std::vector<double>& segments) {
+  constexpr double kBent_deg = 8.0;
+  at_.push_back(0.0);
+  for (const double segment : segments) at_.push_back(at_.back() + segment);
+  for (std::size_t i = 1; i + 1 < chain_.size(); ++i) {
+    const double bent_deg = angle_deg(figure[chain_[i]].offset, figure[chain_[i + 1]].offset);
+    bends_.push_back(at_[i + 1] > at_[i] && bent_deg > kBent_deg);
+  }
+}
+
+std::optional<TwoBones> CutLimb::least(auto cost_of_limb) const {
+  std::optional<TwoBones> found;
+  double least = 1e300;
+  const std::size_t count = chain_.size();
+  for (std::size_t begin = 0; begin + 2 < count; ++begin) {
+    for (std::size_t bend = begin + 1; bend + 1 < count; ++bend) {
+      for (std::size_t end = has_end_ ? count - 1 : bend + 1; end < count; ++end) {
+        const TwoBones two{begin, bend, end, way(begin, end)};
+        const double cost = cost_of(two) + cost_of_limb(two);
+        if (cost >= least) continue;
+        least = cost;
+        found = two;
+      }
+    }
+  }
+  return found;
+}
+
+double CutLimb::cost_of(const TwoBones& two) const {
+  constexpr double kInner = 0.05;  // a joint within a bone: of equal cuts the one with fewer
+  constexpr double kBent = 0.5;    // one at which the zero pose bends is an elbow or a knee
+  double cost = off(way(two.begin, two.bend), way(two.bend, two.end), 0.15);
+  for (std::size_t i = two.begin + 1; i < two.end; ++i) {
+    if (i != two.bend) cost += bends_[i - 1] ? kBent : kInner;
+  }
+  return cost;
+}
+
+std::optional<TwoBones> CutLimb::as_leg() const {
+  return least([this](const TwoBones& two) {
+    return 0.5 * off_rest(rest(two), 0.25 * two.length, 0.4, 1.0) + at_[two.begin] / two.length;
+  });
+}
+
+std::optional<TwoBones> CutLimb::as_arm(double leg) const {
+  if (!(leg > 0.0)) return least([](const TwoBones& two) { return -unlike(two.length, 1e-9); });
+  // Across the shoulders counts where the body's middle is known, else the limb begins soon.
+  return least([this, leg](const TwoBones& two) {
+    double cost = off(two.length, kArmOfLeg * leg, 0.05);
+    cost += 0.3 * off_rest(rest(two), 0.2 * leg, 0.7, 0.15);
+    if (!to_first_) return cost + 0.5 * at_[two.begin] / std::max(two.length, 1e-9);
+    return cost + 0.7 * off(*to_first_ + at_[two.begin], 0.3 * leg, 0.3);
+  });
+}
+
+}  // namespace posed::rig
