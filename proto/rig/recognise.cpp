@@ -9,8 +9,9 @@
 namespace posed::rig {
 namespace {
 
-constexpr double kAdultLeg_m = 0.82;   // thigh and shin
-constexpr double kAdultHand_m = 0.18;  // wrist to the tip of the middle finger
+constexpr double kAdultLeg_m = 0.82;    // thigh and shin
+constexpr double kAdultTrunk_m = 0.48;  // hips to the middle of the shoulders
+constexpr double kAdultHand_m = 0.18;   // wrist to the tip of the middle finger
 constexpr double kMaxLength = 1e9;
 
 struct LengthUnit {
@@ -56,13 +57,25 @@ const LengthUnit& unit_for(double length, double true_m, double usual_m) {
   });
 }
 
+// How long thigh and shin would be if the person had an adult's proportions. Children and toons,
+// whose legs are short for their trunks, are else taken for tall people in inches.
+double adult_leg(const Figure& figure, const BoneJoints& joint, double leg) {
+  const auto left = figure.between(joint[Bone::kHips], joint[Bone::kLeftUpperArm]);
+  const auto right = figure.between(joint[Bone::kHips], joint[Bone::kRightUpperArm]);
+  if (!left || !right) return leg;
+  const double trunk = (*left + *right).norm() / 2.0 * kAdultLeg_m / kAdultTrunk_m;
+  constexpr double kMaxRatio = 2.0;  // beyond it the hips are somewhere else
+  return trunk > leg / kMaxRatio && trunk < leg * kMaxRatio ? std::sqrt(leg * trunk) : leg;
+}
+
 // Whether it may be metres: those of children, giants and toys are.
 bool may_be_metres(double length, double true_m) {
   constexpr double kToo = 8.0;
   return length * kToo > true_m && length < kToo * true_m;
 }
 
-void set_unit(double length, double true_m, double usual_m, std::string_view what,
+// `likened`: the length in a figure of an adult's proportions.
+void set_unit(double length, double likened, double true_m, double usual_m, std::string_view what,
               const RigInput& input, Rig& rig) {
   if (!(length > 0.0)) return;
   if (input.format_says && !rig.metres_per_unit && may_be_metres(length, true_m)) {
@@ -70,7 +83,7 @@ void set_unit(double length, double true_m, double usual_m, std::string_view wha
   }
   // A figure as small as a thumb is the usual mistake of a format that has a unit.
   if (input.format_says && length < true_m && !may_be_metres(length, true_m)) usual_m = kHundred;
-  const LengthUnit& unit = unit_for(length, true_m, usual_m);
+  const LengthUnit& unit = unit_for(likened, true_m, usual_m);
   if (!rig.metres_per_unit) {
     rig.metres_per_unit = unit.metres;
     rig.unit = unit.name;
@@ -241,12 +254,14 @@ Rig recognise_found(const RigInput& input, const Figure& figure,
   if (found.kind == Kind::kPerson && frames.can_find_person()) {
     frames.find_person();
     set_facing(input, frames, rig);
-    set_unit(frames.leg_length(), kAdultLeg_m, usual_unit_m(input.joints, names),
-             "thigh and shin are", input, rig);
+    const double leg = frames.leg_length();
+    set_unit(leg, adult_leg(figure, found.joint, leg), kAdultLeg_m,
+             usual_unit_m(input.joints, names), "thigh and shin are", input, rig);
   } else if (found.kind == Kind::kHand) {
     const Side side = found.joint.has(Bone::kLeftHand) ? Side::kLeft : Side::kRight;
     frames.find_hand(side);
-    set_unit(frames.hand_length(side), kAdultHand_m, 0.0, "the hand is", input, rig);
+    const double hand = frames.hand_length(side);
+    set_unit(hand, hand, kAdultHand_m, 0.0, "the hand is", input, rig);
   } else {
     rig.kind = Kind::kPart;
     frames.lay_parts();

@@ -1098,6 +1098,19 @@ TEST_CASE("rig: a joint called LHipJoint says CMU's unit of length, of a short p
   CHECK(rig::recognise(made.input).metres_per_unit == Approx(0.0254 / 0.45));
 }
 
+TEST_CASE("rig: short legs below a long trunk are a child's, not a giant's in inches") {
+  const auto unit_of = [](double metres_per_unit, const test::Build& build) {
+    auto made =
+        test::make(test::kSchemes[0], ZeroPose::kT, Mat::Identity(), metres_per_unit, 0, 1, build);
+    made.input.poses = {};
+    return rig::recognise(made.input).metres_per_unit;
+  };
+  CHECK(unit_of(0.01, {.trunk = 0.85, .legs = 0.55, .axes = {}}) == Approx(0.01));
+  CHECK(unit_of(0.01, {.height = 0.65, .legs = 0.8, .axes = {}}) == Approx(0.01));
+  CHECK(unit_of(0.0254, {}) == Approx(0.0254));
+  CHECK(unit_of(0.0254, {.height = 0.85, .axes = {}}) == Approx(0.0254));
+}
+
 TEST_CASE("rig: a mark beside a hand is no elbow") {
   auto made = test::make(test::kSchemes[0], ZeroPose::kT, Mat::Identity(), 0.01);
   auto& joints = made.input.joints;
