@@ -1056,7 +1056,8 @@ Result<Skeleton> robot_skeleton(const RobotHand& hand) {
       skeleton.channels.push_back({.joint = static_cast<std::uint16_t>(l),
                                    .axis = Axis::kX,
                                    .min = static_cast<float>(turns.low),
-                                   .max = static_cast<float>(turns.high)});
+                                   .max = static_cast<float>(turns.high),
+                                   .follows = turns.follows});
     }
     skeleton.joints.push_back(std::move(joint));
   }

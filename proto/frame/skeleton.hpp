@@ -32,6 +32,7 @@ struct Channel {
   bool translation = false;  // metres in the parent's frame; otherwise a rotation [rad]
   float min = -std::numeric_limits<float>::infinity();
   float max = std::numeric_limits<float>::infinity();
+  bool follows = false;  // mechanically tied to another joint, so that nobody may command it
 };
 
 struct Joint {

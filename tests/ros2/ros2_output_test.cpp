@@ -52,7 +52,7 @@ std::shared_ptr<const Skeleton> finger() {
   add("joint_1.0", 1, {0.0, 0.0, 0.05});
   add("thumb", 0, {0.03, 0.0, 0.0});
   skeleton->channels = {{.joint = 1, .axis = Axis::kX},
-                        {.joint = 2, .axis = Axis::kX},
+                        {.joint = 2, .axis = Axis::kX, .follows = true},
                         {.joint = 3, .axis = Axis::kY},
                         {.joint = 3, .axis = Axis::kZ}};
   REQUIRE(skeleton->finish());
@@ -164,10 +164,13 @@ TEST_CASE("Fast DDS reads a controller's trajectory on the topic of the config")
   REQUIRE(reader.line("writers")["writers"] == 1);
   rig.pass(0.7, RobotState::kEngaged);
   const Json sample = reader.line("name");
-  CHECK(sample["name"].size() == 4);
+  // Controllers refuse a joint that they do not drive.
+  CHECK(sample["name"] == Json({"joint_0.0", "thumb_y", "thumb_z"}));
   REQUIRE(sample["points"].size() == 1);
   const Json& point = sample["points"][0];
+  REQUIRE(point["positions"].size() == 3);
   CHECK(point["positions"][0].get<double>() == Approx(0.7));
+  CHECK(point["positions"][1].get<double>() == Approx(0.3));
   CHECK(point["velocities"].empty());  // or controllers refuse an end that moves
   CHECK(point["time_ns"] == 20'000'000);
 }

@@ -77,6 +77,14 @@ Ros2Stream::Ros2Stream(const config::OutputConfig& config, std::shared_ptr<DdsDo
         "posed/" + ros_word(stream.name) + (trajectory_ ? "/joint_trajectory" : "/joint_commands");
   }
   for (std::string& name : joint_names_) joint_texts_.push_back(name.data());
+  std::size_t angle = 0;
+  for (const Channel& channel : skeleton_->channels) {
+    if (channel.translation) continue;
+    if (!channel.follows) driven_.push_back(angle);
+    ++angle;
+  }
+  for (const std::size_t driven : driven_) driven_texts_.push_back(joint_texts_[driven]);
+  driven_positions_.resize(driven_.size());
   positions_.resize(joint_names_.size());
   velocities_.resize(joint_names_.size());
   transforms_.resize(frame_names_.size());
@@ -136,14 +144,17 @@ SendOutcome Ros2Stream::send_command(Stamp stamp) {
   std::ranges::copy_n(frame_.velocity_rad_s.begin(), std::ssize(velocities_), velocities_.begin());
   const auto state = joint_state(stamp, true);
   if (!trajectory_) return joints_->write(&state);
-  // Without velocities: controllers refuse a trajectory that does not end at rest.
+  // Without velocities: controllers refuse a trajectory that does not end at rest; and one with
+  // joints that they do not drive.
+  std::ranges::transform(driven_, driven_positions_.begin(),
+                         [this](std::size_t angle) { return positions_[angle]; });
   const double reach_s = std::clamp(2.0 * period_s_, kMinReach_s, kMaxReach_s);
   trajectory_msgs_msg_dds__JointTrajectoryPoint_ point{};
-  point.positions = state.position;
+  point.positions = sequence(driven_positions_);
   point.time_from_start.nanosec = static_cast<std::uint32_t>(nanoseconds(reach_s));
   trajectory_msgs_msg_dds__JointTrajectory_ message{};
   message.header = state.header;
-  message.joint_names = state.name;
+  message.joint_names = sequence(driven_texts_);
   message.points = {._maximum = 1, ._length = 1, ._buffer = &point, ._release = false};
   return joints_->write(&message);
 }

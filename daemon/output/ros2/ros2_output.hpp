@@ -62,7 +62,10 @@ class Ros2Stream {
   std::vector<std::string> joint_names_, frame_names_;
   std::string world_ = motion::kRosWorld;
   std::vector<char*> joint_texts_;
-  std::vector<double> positions_, velocities_;                        // [rotation channel]
+  std::vector<double> positions_, velocities_;  // [rotation channel]
+  std::vector<std::size_t> driven_;  // the rotation channels that a controller may be told
+  std::vector<char*> driven_texts_;
+  std::vector<double> driven_positions_;
   std::vector<geometry_msgs_msg_dds__TransformStamped_> transforms_;  // [joint]
 };
 
