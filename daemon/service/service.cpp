@@ -70,7 +70,7 @@ Service::Service(std::vector<system::ThreadPulse> threads)
   const int asked = present_ ? ::sd_watchdog_enabled(0, &within_us) : 0;
   if (asked < 0) {
     spdlog::warn(
-        "WATCHDOG_USEC or WATCHDOG_PID is no number ({}), so nobody is told when posed is stuck;"
+        "WATCHDOG_USEC or WATCHDOG_PID makes no sense ({}), so nobody is told when posed is stuck;"
         " leave setting them to systemd",
         errno_text(-asked));
   }

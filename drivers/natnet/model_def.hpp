@@ -5,6 +5,7 @@
 //   i32 count, then each: i32 type, from 4.1 an i32: the size in bytes of what follows, and
 //   0 marker set   text name, i32 count, count texts
 //   1 rigid body   text name, i32 id, i32 parent, f32[3] offset [m],
+//                  from 4.2: f32[4] rotation at rest,
 //                  from 3.0: i32 count, count f32[3], count i32 labels, from 4.0: count texts
 //   2 skeleton     text name, i32 id, i32 count, count rigid bodies (public
 //                  descriptions do not agree whether these bones carry markers from 3.0 on, so
@@ -51,9 +52,9 @@ struct ModelDef {
   std::map<std::string, std::size_t, std::less<>> markers;
 };
 
-// Tries this version if it is known, then 3.0, 4.1, 4.0 and 2.9: the first reading that uses up the
-// payload exactly is taken; an error if none does. The bytes are untrusted; names are not checked
-// for being text. Cold.
+// Tries this version if it is known, then 3.0, 4.1, 4.2, 4.0 and 2.9: the first reading that uses
+// up the payload exactly is taken; an error if none does. The bytes are untrusted; names are not
+// checked for being text. Cold.
 Result<ModelDef> parse_model_def(std::span<const std::byte> payload, Version version);
 
 }  // namespace posed::drivers::natnet

@@ -28,7 +28,7 @@
 //    major, minor   the NatNet version; 0, 0: unknown
 //    rate           frames a second; 0: unknown
 //
-// Sources: the packet samples of the NatNet SDK 2.5 to 4.1, and the recordings that
+// Sources: the packet samples of the NatNet SDK 2.5 to 4.2, and the recordings that
 // drivers/natnet/README.md names.
 #pragma once
 

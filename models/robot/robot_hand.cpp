@@ -429,6 +429,7 @@ class Builder {
     constexpr double kOneWay = 0.7, kAcross = 0.5;
     std::vector<Finger>& fingers = hand_.fingers;
     return std::ranges::find_if(fingers, [&](const Finger& thumb) {
+      if (bend(thumb).isZero()) return false;  // it bends as far to both sides
       return std::ranges::all_of(fingers, [&](const Finger& one) {
         if (one.last == thumb.last) return true;
         return bend(one).dot(bend(thumb)) < kAcross &&
@@ -486,8 +487,9 @@ class Builder {
     return word == kWords.end() ? 0 : word->second;
   }
 
-  // The thumb has the name, or else points away from the others, or bends against them. They are in
-  // a row whose end near the thumb is the index finger, unless their names say otherwise.
+  // The thumb has the name, or else points away from the others, or bends against or across them.
+  // They are in a row whose end near the thumb is the index finger, unless their names say
+  // otherwise.
   Result<> order_fingers() {
     std::vector<Finger>& fingers = hand_.fingers;
     auto thumb = std::ranges::find_if(fingers, [&](const Finger& f) { return is_named_thumb(f); });
@@ -513,7 +515,7 @@ class Builder {
       if (thumb == fingers.end()) {
         return refuse(
             "no finger is named thumb, none points away from the others when open, and none bends "
-            "against all others; `tips` can name their last links, thumb first");
+            "against or across all others; `tips` can name their last links, thumb first");
       }
     }
     std::iter_swap(thumb, fingers.begin());
@@ -589,6 +591,11 @@ class Builder {
         return refuse(what + " = " + in_quotes(one.name) +
                       " is no joint and angle; write \"JOINT=0.5\"");
       }
+      const Link& link = hand_.links[hand_.joints[joint].link];
+      if (link.leader >= 0) {
+        return refuse(what + " names joint " + in_quotes(one.name) + ", which follows joint " +
+                      in_quotes(hand_.links[link.leader].joint) + ": name that one");
+      }
       const RobotJoint& at = hand_.joints[joint];
       if (!(one.number >= at.low && one.number <= at.high)) {
         return refuse(what + " puts joint " + in_quotes(at.name) + " beyond its limits");
@@ -605,6 +612,11 @@ class Builder {
       std::erase(others_, hand_.joints[joint].link);
     }
     starts_ = TRY(angles(options_.start, "start"));
+    for (const auto& [joint, value] : starts_) {
+      if (std::isnan(held_[joint])) continue;
+      return refuse("start names joint " + in_quotes(hand_.joints[joint].name) +
+                    ", which stands: `hold` names its angle");
+    }
     return {};
   }
 
@@ -687,13 +699,14 @@ class Builder {
       link.at.rotate(Eigen::AngleAxisd(joint.offset, link.axis));
       link.turns = false;
       hand_.joint_of_link[joint.link] = -1;
+      if (link.leader >= 0) continue;  // it goes with the joint that it follows
       if (++others <= kShown) names.push_back(in_quotes(joint.name));
     }
     hand_.joints = std::move(kept);
     if (others == 0) return;
     hand_.remarks.push_back("no command names " + joined(names) + (others > kShown ? ", ..." : "") +
-                            " (which move all fingers or none): they are taken to stand at zero, "
-                            "unless `hold` names them and their angles");
+                            " (which move all fingers or none): they are taken to stand at zero or "
+                            "the limit nearest to it, unless `hold` names them and their angles");
   }
 
   Result<> check_speeds() const {
@@ -778,23 +791,22 @@ class Builder {
   }
 
   // Turns a finger's joints to where it is longest, and those that change no length, as a
-  // knuckle's, as far as the others went about the same axis.
+  // knuckle's, to their limit on the side to which the others went.
   void open_fist(const Finger& finger) {
     constexpr int kAngles = 32, kRounds = 2;
-    constexpr double kSameAxis = 0.7;
+    constexpr double kSameAxis = 0.7, kLonger_m = 1e-5;
     Eigen::Vector3d opened = Eigen::Vector3d::Zero();
-    std::vector<int> rest;
+    const std::vector<double> zero_rad = open_rad_;
     const double before_m = stretch_m(finger);
     const auto axes = placed_.axis;
     for (int round = 0; round < kRounds; ++round) {
-      rest.clear();
       for (int l = finger.last; l > 0 && is_above(finger.base, l); l = hand_.links[l].parent) {
         if (!hand_.links[l].turns) continue;
         const Link& own = hand_.links[l];
         const int leads = own.leader < 0 ? l : own.leader;
         const Link& link = hand_.links[leads];
         const double was_rad = open_rad_[l];
-        double best = open_rad_[leads], longest_m = stretch_m(finger) + kSamePlace_m;
+        double best = open_rad_[leads], longest_m = stretch_m(finger) + kLonger_m;
         for (int k = 0; k <= kAngles; ++k) {
           open_rad_[leads] = link.low + (link.high - link.low) * k / kAngles;
           const double found_m = stretch_m(finger);
@@ -805,14 +817,14 @@ class Builder {
         open_rad_[leads] = best;
         place_open();
         opened += (open_rad_[l] - was_rad) * axes[l];
-        if (open_rad_[l] == was_rad && own.leader < 0) rest.push_back(l);
       }
     }
     if (stretch_m(finger) < before_m + kSamePlace_m) return;
-    for (const int l : rest) {
+    for (int l = finger.last; l > 0 && is_above(finger.base, l); l = hand_.links[l].parent) {
+      const Link& link = hand_.links[l];
+      if (!link.turns || link.leader >= 0 || open_rad_[l] != zero_rad[l]) continue;
       const double same = axes[l].dot(opened.normalized());
-      if (std::abs(same) < kSameAxis) continue;
-      open_rad_[l] = same > 0.0 ? hand_.links[l].high : hand_.links[l].low;
+      if (std::abs(same) >= kSameAxis) open_rad_[l] = same > 0.0 ? link.high : link.low;
     }
     place_open();
   }
@@ -834,7 +846,8 @@ class Builder {
     }
     hand_.remarks.emplace_back(
         "at zero the fingers are bent: palm and side are derived from the fingers where they are "
-        "longest, and knuckles as far open as their limits let them");
+        "longest, and knuckles as far open as their limits let them; shapes that touch at zero are "
+        "not kept apart");
   }
 
   Drive open_pose() const {

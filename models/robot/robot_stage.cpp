@@ -38,6 +38,7 @@ enum Notice : std::size_t {
   kSlower,
   kSeveral,
   kUnlimited,
+  kAssumed,
   kNotices
 };
 
@@ -108,8 +109,10 @@ const RobotStage::Table& RobotStage::table() {
       Table::row<&StageOptions::tips>(
           {.name = "tips",
            .help = "last links of the fingers, thumb first: \"t, i, m, r, l\"; empty: derived"}),
-      Table::row<&StageOptions::hold>(
-          {.name = "hold", .help = "joints that stand: \"wrist=0.1, other=0\", rad"}),
+      Table::row<&StageOptions::hold>({.name = "hold",
+                                       .help = "joints that stand, \"wrist=0.1\", rad; an arm's "
+                                               "and a wrist's have commands only if "
+                                               "they are here"}),
       Table::row<&StageOptions::speed>(
           {.name = "speed",
            .help = "of each joint, rad/s, 0: 8; or what the URDF says where that is less",
@@ -154,6 +157,7 @@ RobotStage::RobotStage(RobotHand robot, Skeleton skeleton, const StageContext& c
     return joint.driven >= 0 && joint.speed < options.speed;
   });
   notice_[kSeveral] = !robot_.chosen.empty();
+  notice_[kAssumed] = !robot_.remarks.empty();
   notice_[kUnlimited] = std::ranges::any_of(
       robot_.links, [](const Link& link) { return link.unlimited && link.leader < 0; });
 }
@@ -391,9 +395,11 @@ const StageType& robot_type() {
                                "for them"},
                   {.sentence =
                        "the robot is more than a hand: the hand of `side` follows, all else "
-                       "stands (`posed inspect` lists the hands)"},
+                       "has no commands (`posed inspect` lists the hands)"},
                   {.sentence = "the URDF gives joints neither lower nor upper limit, so that they "
-                               "stand at 0 (`posed inspect` names them)"}},
+                               "stand at 0 (`posed inspect` names them)"},
+                  {.sentence = "the URDF leaves open what some of the robot is: `posed inspect` "
+                               "says how it is taken"}},
       .commands = {{.name = "engage",
                     .help = "the robot follows the hand, from where it is",
                     .encode = no_words},

@@ -19,7 +19,7 @@ constexpr double kRounding_m = 1e-9;
 constexpr double kLost_m = 1e3;    // also for what is no number: whatever was known is void
 constexpr double kSlack_m = 6e-3;  // capsules this much beyond the nearest are kept
 constexpr std::size_t kMaxHullPairs = 4096;  // half a second's work when a robot is loaded
-constexpr double kOpen_m = 1e-3;             // shapes nearer than this when open are made to touch
+constexpr double kOpen_m = 1e-3;  // shapes nearer than this at the start are made to touch
 constexpr double kThin_m = 1e-3;  // a shape of a smaller radius has its corners rounded off
 
 double per_length2(const Eigen::Vector3d& from_m, const Eigen::Vector3d& to_m) {

@@ -77,7 +77,7 @@ void add_format(Format format);
 // The format of a name by its extension alone; null if no format has it.
 [[nodiscard]] const Format* format_of(const std::filesystem::path& path);
 // The format that recognises a file by its first bytes; null if none does.
-constexpr std::size_t kSniffedBytes = 4096;
+inline constexpr std::size_t kSniffedBytes = 4096;
 [[nodiscard]] const Format* format_of_bytes(std::string_view begin);
 // The format of a file that is read: a name may be wrong, so what recognises the content comes
 // before the extension. Null if neither tells.
@@ -91,9 +91,9 @@ enum class Use : std::uint8_t { kRead, kReadBody, kWrite, kWriteBody };
 // All extensions of these formats.
 [[nodiscard]] std::vector<std::string_view> extensions(Use use);
 
-// Returns whether files of this name accept the option; false for a name of no format.
+// Returns whether this file accepts the option; false for one of no format.
 [[nodiscard]] bool accepts(const std::filesystem::path& path, ReadOption option);
-// The options without those that files of this name do not accept, for commands that read several
+// The options without those that this file does not accept, for commands that read several
 // clips by the same options.
 [[nodiscard]] ReadOptions accepted_options(const std::filesystem::path& path, ReadOptions options);
 // Refuses options that a format does not accept, instead of silently ignoring them.

@@ -144,7 +144,7 @@ std::vector<std::string_view> extensions(Use use) {
 }
 
 bool accepts(const std::filesystem::path& path, ReadOption option) {
-  const Format* format = format_of(path);
+  const Format* format = format_of_file(path);
   return format != nullptr && has(*format, option);
 }
 
@@ -177,7 +177,7 @@ Result<> check_options(const Format& format, const ReadOptions& options, const s
 }
 
 std::filesystem::path skeleton_beside(const std::filesystem::path& path) {
-  const Format* format = format_of(path);
+  const Format* format = format_of_file(path);
   if (format == nullptr || format->skeleton_extension.empty()) return {};
   return beside(*format, path);
 }

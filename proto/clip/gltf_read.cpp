@@ -87,6 +87,16 @@ std::string_view json_of(std::string_view bytes) {
 // A whole number that is written with a point or an exponent, as JSON and glTF allow (3.0, 1e2),
 // in digits alone; empty for any other word.
 std::string whole_number(std::string_view word) {
+  constexpr std::string_view kDigits = "0123456789";
+  const std::string_view digits = word.substr(word.starts_with('-') ? 1 : 0);
+  const std::size_t point = digits.find('.');
+  const auto is_digit = [&](std::size_t at) {
+    return at < digits.size() && kDigits.contains(digits[at]);
+  };
+  // No number of JSON, which from_chars() takes: 01.0, .5, 5.
+  const bool is_json = is_digit(0) && !(digits[0] == '0' && is_digit(1)) &&
+                       (point == digits.npos || is_digit(point + 1));
+  if (!is_json) return {};
   constexpr double kMaxWhole = 9007199254740992.0;  // up to which a double has each whole number
   double value = 0.0;
   const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);

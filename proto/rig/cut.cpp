@@ -90,7 +90,8 @@ double CutLimb::cost_of(const TwoBones& two) const {
 
 std::optional<TwoBones> CutLimb::as_leg() const {
   return least([this](const TwoBones& two) {
-    return 0.5 * off_rest(rest(two), 0.25 * two.length, 0.4, 1.0) + at_[two.begin] / two.length;
+    return 0.5 * off_rest(rest(two), 0.25 * two.length, 0.4, 1.0) +
+           at_[two.begin] / std::max(two.length, 1e-9);
   });
 }
 

@@ -50,6 +50,7 @@ std::vector<bool> copies_in(const std::vector<JointName>& names) {
     if (name.digits.empty()) plain.emplace(name.side, name.stem);
   }
   std::vector<bool> out;
+  out.reserve(names.size());
   for (const JointName& name : names) {
     out.push_back(!name.digits.empty() && plain.contains({name.side, name.stem}));
   }

@@ -104,7 +104,7 @@ struct Convert {
 
 bool is_mcap(const std::string& path) { return clip::extension_of(path) == ".mcap"; }
 bool is_hand(const std::string& path) {
-  const clip::Format* format = clip::format_of(path);
+  const clip::Format* format = clip::format_of_file(path);
   return format != nullptr && format->is_hand;
 }
 bool holds_gaps(const std::string& path) { return clip::format_of(path)->holds_gaps; }

@@ -39,11 +39,11 @@ class Measure {
   }
 
   [[nodiscard]] bool of_hands() const {
-    const clip::Format* format = clip::format_of(options_.clip);
+    const clip::Format* format = clip::format_of_file(options_.clip);
     return !options_.hand.empty() || (format != nullptr && format->is_hand);
   }
   [[nodiscard]] bool may_be_clip(const Path& path) const {
-    const clip::Format* format = clip::format_of(path);
+    const clip::Format* format = clip::format_of_file(path);
     if (format == nullptr || format->read == nullptr) return false;
     if (format->is_hand) return of_hands();
     // A body holds two hands, so only --hand says which.

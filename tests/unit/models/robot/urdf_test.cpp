@@ -466,7 +466,7 @@ TEST_CASE("of three fingers around the palm the file's first is the thumb, of fo
       REQUIRE(hand->remarks.size() == 1);
       CHECK(hand->remarks[0].find("'a2' is taken for the thumb") != std::string::npos);
     }
-    CHECK(refusal(claw({"a", "b", "c", "d"}, splay)).find("none bends against all others") !=
+    CHECK(refusal(claw({"a", "b", "c", "d"}, splay)).find("none bends against or across") !=
           std::string::npos);
   }
 }
@@ -490,6 +490,40 @@ TEST_CASE("a thumb that lies beside the fingers is the one that bends across the
   }
   CHECK(ends == "c2a2b2d2");
   CHECK(read->side == Side::kLeft);
+}
+
+TEST_CASE("a finger that bends as far to both sides is not the thumb for it") {
+  std::vector<Hinge> hand;
+  for (const std::string finger : {"a", "b", "c"}) {
+    const std::string at = finger == "a"   ? "0.08 0.02 0"
+                           : finger == "b" ? "0.08 0 0"
+                                           : "0.08 -0.02 0";
+    const std::string both =
+        finger == "b" ? "lower=\"-1\" upper=\"1\"" : "lower=\"0\" upper=\"1.5\"";
+    hand.push_back({"palm", finger + "1", at, "0 0 0", "0 -1 0", both});
+    hand.push_back({finger + "1", finger + "2", "0.04 0 0", "0 0 0", "0 -1 0", both});
+  }
+  CHECK(refusal(hinged(hand)).find("`tips` can name") != std::string::npos);
+}
+
+TEST_CASE("an angle for a joint that follows, or to begin where one stands, is refused") {
+  const auto refused = [](const std::string& hold, const std::string& start) {
+    const auto hand =
+        robot_hand(parse_urdf(hinged(barrett()), "r").value(), {.hold = hold, .start = start}, "r");
+    return hand ? "" : hand.error().message;
+  };
+  std::vector<Hinge> hand = barrett();
+  REQUIRE(refused("", "") == "");
+  CHECK(refused("f12_joint=0.1", "f12_joint=0.2").find("`hold` names its angle") !=
+        std::string::npos);
+  const auto follower = std::ranges::find_if(
+      hand, [](const Hinge& hinge) { return hinge.more.find("<mimic") != std::string::npos; });
+  REQUIRE(follower != hand.end());
+  for (const bool holds : {true, false}) {
+    const std::string angle = follower->child + "_joint=0.1";
+    CHECK(refused(holds ? angle : "", holds ? "" : angle).find("name that one") !=
+          std::string::npos);
+  }
 }
 
 TEST_CASE("a rod beside a finger is no finger, and a finger beside one is no rod") {
@@ -585,6 +619,7 @@ TEST_CASE("a hand whose zero is a fist is read as the open one") {
     for (std::size_t l = 0; l < fist.links.size(); ++l) {
       Link& link = fist.links[l];
       if (!link.turns || link.leader >= 0 || link.high < 1.0) continue;
+      link.low -= 0.2;  // straight is within its limits
       moved_rad[l] = link.high;
     }
     for (std::size_t l = 0; l < fist.links.size(); ++l) {
