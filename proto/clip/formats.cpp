@@ -150,14 +150,18 @@ bool accepts(const std::filesystem::path& path, ReadOption option) {
 
 ReadOptions accepted_options(const std::filesystem::path& path, ReadOptions options) {
   const ReadOptions none;
-  if (!accepts(path, ReadOption::kSkeleton)) options.skeleton = none.skeleton;
-  if (!accepts(path, ReadOption::kRate)) options.rate_hz = none.rate_hz;
-  if (!accepts(path, ReadOption::kUnit)) options.metres_per_unit = none.metres_per_unit;
-  if (!accepts(path, ReadOption::kUp)) options.up = none.up;
-  if (!accepts(path, ReadOption::kFacing)) options.facing = none.facing;
-  if (!accepts(path, ReadOption::kProfile)) options.profile = none.profile;
-  if (!accepts(path, ReadOption::kHand)) options.hand = none.hand;
-  if (!accepts(path, ReadOption::kHandShape)) options.hand_shape = none.hand_shape;
+  const Format* format = format_of_file(path);
+  const auto accepted = [format](ReadOption option) {
+    return format != nullptr && has(*format, option);
+  };
+  if (!accepted(ReadOption::kSkeleton)) options.skeleton = none.skeleton;
+  if (!accepted(ReadOption::kRate)) options.rate_hz = none.rate_hz;
+  if (!accepted(ReadOption::kUnit)) options.metres_per_unit = none.metres_per_unit;
+  if (!accepted(ReadOption::kUp)) options.up = none.up;
+  if (!accepted(ReadOption::kFacing)) options.facing = none.facing;
+  if (!accepted(ReadOption::kProfile)) options.profile = none.profile;
+  if (!accepted(ReadOption::kHand)) options.hand = none.hand;
+  if (!accepted(ReadOption::kHandShape)) options.hand_shape = none.hand_shape;
   return options;
 }
 
