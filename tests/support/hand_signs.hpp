@@ -20,7 +20,7 @@ inline const std::vector<ThumbSign> kThumbSigns{
     {"U", 0b01000, 'v'}, {"W", 0b10000, 'w'}, {"S", 0b00100, 's'}, {"I", 0b00100, 'i'},
     {"F", 0b00010, 'f'}, {"T", 0b00010, 'f'}};
 
-// Six of a sign's poses: the library's angles, flexion positive, not yet through a glove's map.
+// Six of a sign's poses.
 inline std::vector<HandAngles> sign_poses(const std::filesystem::path& folder,
                                           const std::string& sign) {
   constexpr Eigen::Index kEach = 17;
@@ -30,10 +30,6 @@ inline std::vector<HandAngles> sign_poses(const std::filesystem::path& folder,
     HandAngles& angles = poses.emplace_back();
     for (std::size_t c = 0; c < angles.size(); ++c) {
       angles[c] = rows(i, static_cast<Eigen::Index>(c));
-    }
-    // The corpus counts spread as a plain rotation.
-    for (const std::size_t spread : {3 * kFingerChannels + 1, 4 * kFingerChannels + 1}) {
-      angles[spread] = -angles[spread];
     }
   }
   return poses;

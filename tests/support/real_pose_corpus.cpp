@@ -1,9 +1,16 @@
 #include "tests/support/real_pose_corpus.hpp"
 
 #include <algorithm>
+#include <array>
+#include <bitset>
+#include <cmath>
+#include <limits>
 #include <numbers>
 #include <stdexcept>
 
+#include "drivers/cyberglove/angles.hpp"
+#include "drivers/cyberglove/protocol.hpp"
+#include "drivers/glove/calibration_file.hpp"
 #include "models/random.hpp"
 #include "proto/clip/text.hpp"
 #include "proto/frame/hand.hpp"
@@ -17,31 +24,23 @@ using gesture::FeatureMatrix;
 
 constexpr double kRate_hz = 30.0;
 constexpr double kRadians = std::numbers::pi / 180.0;
-constexpr int kSensors = 22;
-enum Axis { kFlexion, kSpread, kTwist };
 
-int channel(int finger, int joint, Axis axis) {
-  return finger * kFingerChannels + 3 * (joint - 1) + axis;
-}
-
-// Maps 22 sensor angles, in the order of the glove's protocol sheet 1.4, to the joints that they
-// measure.
-RowVectorXd hand_of(const std::vector<double>& sensor) {
-  RowVectorXd hand = RowVectorXd::Zero(kHandChannels);
-  hand[channel(0, 1, kTwist)] = sensor[0];
-  hand[channel(0, 2, kFlexion)] = sensor[1];
-  hand[channel(0, 3, kFlexion)] = sensor[2];
-  hand[channel(0, 1, kSpread)] = sensor[3];
-  const int first_sensor[]{0, 4, 7, 11, 15};
-  for (int finger = 1; finger < kFingers; ++finger) {
-    for (int joint = 1; joint <= kFingerJoints; ++joint) {
-      hand[channel(finger, joint, kFlexion)] = sensor[first_sensor[finger] + joint - 1];
-    }
+// A row's angles as a CyberGlove's map makes a hand of them. `angle` are the maker's library's,
+// flexion negative.
+RowVectorXd hand_of(const drivers::glove::Calibration& glove, std::span<const double> angle) {
+  namespace cyberglove = drivers::cyberglove;
+  std::array<float, cyberglove::kSensors> value{};
+  std::ranges::copy(angle, value.begin());
+  // The recorder counted them away from the library, whose abduction is positive towards the thumb.
+  for (const auto i : {cyberglove::kIndexAbd, cyberglove::kMiddleAbd, cyberglove::kRingAbd,
+                       cyberglove::kLittleAbd}) {
+    value[i] = -value[i];
   }
-  hand[channel(1, 1, kSpread)] = sensor[10];
-  hand[channel(3, 1, kSpread)] = -sensor[14];
-  hand[channel(4, 1, kSpread)] = -sensor[14] - sensor[18];
-  return hand;
+  std::bitset<drivers::glove::kMaxSensors> measured;
+  measured.set();
+  HandAngles hand;
+  glove.map_to_hand(value, measured, hand);
+  return Eigen::Map<const RowVectorXd>(hand.data(), std::ssize(hand));
 }
 
 // The numbers at the start of a line; the sign's name follows them.
@@ -66,18 +65,50 @@ double minimum_jerk(double t) { return t * t * t * (10.0 - 15.0 * t + 6.0 * t * 
 
 }  // namespace
 
-FeatureMatrix libras_poses(const std::filesystem::path& folder, const std::string& sign) {
+std::vector<std::vector<double>> libras_rows(const std::filesystem::path& folder,
+                                             const std::string& sign) {
   const std::string text =
       load_file(folder / (sign + ".csv"), {"recording", std::uintmax_t{1} << 30}).value();
-  std::vector<RowVectorXd> rows;
+  std::vector<std::vector<double>> rows;
   for (std::string_view left = text; !left.empty();) {
-    std::vector<double> sensors = numbers_of(clip::next_line(left));
-    if (sensors.size() < kSensors) continue;
-    for (double& value : sensors) value = -value;  // flexion is positive in hand45
-    rows.push_back(hand_of(sensors));
+    std::vector<double> row = numbers_of(clip::next_line(left));
+    if (row.size() < kLibrasAngles) continue;
+    row.resize(kLibrasAngles);  // a digit's name is a number, too
+    rows.push_back(std::move(row));
   }
   if (rows.empty()) throw std::runtime_error("no poses of " + sign);
+  return rows;
+}
+
+FeatureMatrix libras_poses(const std::filesystem::path& folder, const std::string& sign) {
+  const auto glove =
+      drivers::glove::default_calibration(drivers::cyberglove::glove_model(Side::kRight).value())
+          .value();
+  std::vector<RowVectorXd> rows;
+  for (const auto& row : libras_rows(folder, sign)) rows.push_back(hand_of(*glove, row));
   return stacked(rows);
+}
+
+double best_composition_deg(const std::filesystem::path& folder, const std::string& label) {
+  const auto mean = [&](const std::string& of) {
+    return RowVectorXd(libras_poses(folder, kSignOf.at(of)).colwise().mean() / kRadians);
+  };
+  const RowVectorXd real = mean(label);
+  const std::array<RowVectorXd, 3> recorded{mean("g"), mean("c"), mean("p")};
+  double squared = 0.0;
+  for (int finger = 1; finger < kFingers; ++finger) {
+    double least = std::numeric_limits<double>::infinity();
+    for (const RowVectorXd& pose : recorded) {
+      double off = 0.0;
+      for (int joint = 0; joint < kFingerJoints; ++joint) {
+        const int flexion = finger * kFingerChannels + 3 * joint;
+        off += std::pow(pose[flexion] - real[flexion], 2);
+      }
+      least = std::min(least, off);
+    }
+    squared += least;
+  }
+  return std::sqrt(squared / ((kFingers - 1) * kFingerJoints));
 }
 
 gesture::Recording real_pose_corpus(const std::filesystem::path& folder, std::uint32_t seed,

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <map>
 #include <string>
+#include <vector>
 
 #include "models/gesture/recording.hpp"
 
@@ -17,9 +18,22 @@ namespace posed::test {
 inline const std::map<std::string, std::string> kSignOf{{"g", "A"}, {"c", "V"}, {"p", "4"},
                                                         {"1", "G"}, {"3", "W"}, {"4", "B"}};
 
-// The 100 poses of a sign [pose][45 angles, rad]; `folder` is data/gloves/libras_cyberglove.
+// The 100 rows of a sign: the maker's library's angles of the sensors 0 to 21 (`SensorIndex`)
+// [rad], which is not the order of the glove's bytes; "the rows of real signs are in the order..."
+// proves it.
+inline constexpr std::size_t kLibrasAngles = 22;
+[[nodiscard]] std::vector<std::vector<double>> libras_rows(const std::filesystem::path& folder,
+                                                           const std::string& sign);
+
+// The same as hands [pose][45 angles, rad]; `folder` is data/gloves/libras_cyberglove.
 [[nodiscard]] gesture::FeatureMatrix libras_poses(const std::filesystem::path& folder,
                                                   const std::string& sign);
+
+// What a label that is no part of the corpus can be composed of at best: each finger but the thumb
+// as in that of g, c, p whose mean is nearest to the label's. Rms of the flexion angles from the
+// label's mean [deg].
+[[nodiscard]] double best_composition_deg(const std::filesystem::path& folder,
+                                          const std::string& label);
 
 // A recording of `gestures` gestures of g, c, p at 30 Hz, never the same twice in a row.
 [[nodiscard]] gesture::Recording real_pose_corpus(const std::filesystem::path& folder,

@@ -1,13 +1,9 @@
 #include "tests/bench/robot/take.hpp"
 
 #include <algorithm>
-#include <bitset>
 #include <cmath>
+#include <iterator>
 
-#include "drivers/cyberglove/angles.hpp"
-#include "drivers/cyberglove/protocol.hpp"
-#include "drivers/glove/calibration.hpp"
-#include "drivers/glove/calibration_file.hpp"
 #include "models/hand/constraint_solver.hpp"
 #include "models/hand/thumb_fit.hpp"
 #include "proto/clip/hand_clip.hpp"
@@ -125,28 +121,12 @@ Result<HandTake> read_take(const std::filesystem::path& path) {
 }
 
 Result<HandTake> signs_take(const std::filesystem::path& folder) {
-  using namespace drivers;
   if (!std::filesystem::exists(folder / "O.csv")) {
     return fail("holds no O.csv: name the folder of the signs", folder.string());
   }
-  const auto model = TRY(cyberglove::glove_model(Side::kRight));
-  const auto calibration = TRY(glove::default_calibration(model));
-  constexpr std::array<std::size_t, 4> kSensor{cyberglove::kThumbRoll, cyberglove::kThumbAbd,
-                                               cyberglove::kThumbMcp, cyberglove::kThumbIp};
   std::vector<HandAngles> poses{HandAngles{}};
   for (const test::ThumbSign& sign : test::kThumbSigns) {
-    for (HandAngles& angles : test::sign_poses(folder, sign.name)) {
-      std::array<float, cyberglove::kSensors> value{};
-      std::bitset<glove::kMaxSensors> valid;
-      valid.set();
-      for (std::size_t i = 0; i < kSensor.size(); ++i) {
-        value[kSensor[i]] = -static_cast<float>(angles[hand::kThumbAngles[i]]);
-      }
-      HandAngles mapped;
-      calibration->map_to_hand(value, valid, mapped);
-      for (const std::size_t c : hand::kThumbAngles) angles[c] = mapped[c];
-      poses.push_back(angles);
-    }
+    std::ranges::copy(test::sign_poses(folder, sign.name), std::back_inserter(poses));
   }
   return kept("signs", moves_through(poses));
 }

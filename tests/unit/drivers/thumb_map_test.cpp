@@ -28,23 +28,6 @@ std::shared_ptr<const Calibration> cyberglove() {
       .value();
 }
 
-// The thumb of a CyberGlove's angles [rad] as the maker's library gives them.
-void map_thumb(const Calibration& calibration, const HandAngles& library, HandAngles& hand) {
-  std::array<float, drivers::cyberglove::kSensors> value{};
-  std::bitset<drivers::glove::kMaxSensors> valid;
-  valid.set();
-  const std::array<std::size_t, 4> sensor{
-      drivers::cyberglove::kThumbRoll, drivers::cyberglove::kThumbAbd,
-      drivers::cyberglove::kThumbMcp, drivers::cyberglove::kThumbIp};
-  for (std::size_t i = 0; i < sensor.size(); ++i) {
-    value[sensor[i]] = -static_cast<float>(library[hand::kThumbAngles[i]]);
-  }
-  HandAngles all;
-  calibration.map_to_hand(value, valid, all);
-  hand = library;
-  for (const std::size_t c : hand::kThumbAngles) hand[c] = all[c];
-}
-
 struct Nearest {
   double index_mm = 1e3, middle_mm = 1e3;
   void take(const hand::HandGeometry& geometry, const HandAngles& angles) {
@@ -58,15 +41,12 @@ struct Nearest {
 TEST_CASE("a CyberGlove's thumb touches in a real sign what the sign touches") {
   const auto folder = test::shared("data/gloves/libras_cyberglove");
   if (!folder) SKIP_WITHOUT_SHARED();
-  const auto calibration = cyberglove();
   const hand::HandGeometry geometry = hand::hand_geometry(default_hand_shape());
   double sum_mm = 0.0, kept_mm = 0.0;
   int count = 0;
   std::ostringstream table;
   for (const test::ThumbSign& sign : test::kThumbSigns) {
-    for (const HandAngles& library : test::sign_poses(*folder, sign.name)) {
-      HandAngles angles;
-      map_thumb(*calibration, library, angles);
+    for (const HandAngles& angles : test::sign_poses(*folder, sign.name)) {
       HandAngles apart = angles;
       HandAngles variance;
       variance.fill(1.0);
@@ -94,7 +74,6 @@ TEST_CASE("a CyberGlove's thumb comes to the fingers where real hands grasp") {
   if (!folder) SKIP_WITHOUT_SHARED();
   const auto calibration = cyberglove();
   const hand::HandGeometry geometry = hand::hand_geometry(default_hand_shape());
-  constexpr std::array<std::size_t, 4> kKnuckle{4, 8, 12, 16};
   int files = 0;
   for (const auto& entry : std::filesystem::directory_iterator(*folder)) {
     if (entry.path().extension() != ".txt") continue;
@@ -102,15 +81,13 @@ TEST_CASE("a CyberGlove's thumb comes to the fingers where real hands grasp") {
     hand::ConstraintSolver solver;
     const auto rows = test::read_grasp_rows(entry.path());
     for (std::size_t row = 0; row < rows.size(); row += 10) {
-      HandAngles library{};
-      for (std::size_t i = 0; i < 4; ++i) {
-        library[hand::kThumbAngles[i]] = -rows[row][std::array<std::size_t, 4>{0, 3, 1, 2}[i]];
-        for (std::size_t j = 0; j < 3; ++j) {
-          library[kFingerChannels * (i + 1) + 3 * j] = -rows[row][kKnuckle[i] + j];
-        }
-      }
+      std::array<float, drivers::cyberglove::kSensors> value{};
+      std::ranges::transform(rows[row], value.begin(),
+                             [](double v) { return static_cast<float>(v); });
+      std::bitset<drivers::glove::kMaxSensors> measured;
+      measured.set();
       HandAngles angles;
-      map_thumb(*calibration, library, angles);
+      calibration->map_to_hand(value, measured, angles);
       HandAngles variance;
       variance.fill(1.0);
       solver.step(angles, variance);

@@ -13,10 +13,6 @@
 namespace posed::hand {
 namespace {
 
-using test::angle;
-
-constexpr int kRing = 3, kLittle = 4;
-
 // Rms over the poses of a sign, degrees.
 struct Change {
   double flexion_deg = 0.0;  // of the four fingers
@@ -26,17 +22,12 @@ struct Change {
   int retreats = 0;
 };
 
-// The corpus gives the spread of ring and little as a plain rotation, positive towards the thumb;
-// in hand45 it is positive away from the middle finger. `turned` converts it to hand45.
-Change change_of(const gesture::FeatureMatrix& poses, bool turned) {
+Change change_of(const gesture::FeatureMatrix& poses) {
   Change change;
   for (Eigen::Index i = 0; i < poses.rows(); ++i) {
     ConstraintSolver solver;
     HandAngles raw;
     for (std::size_t c = 0; c < raw.size(); ++c) raw[c] = poses(i, static_cast<Eigen::Index>(c));
-    if (turned) {
-      for (const int finger : {kRing, kLittle}) raw[angle(finger, 0, 1)] *= -1.0;
-    }
     HandAngles angles = raw;
     const ConstraintReport report = solver.step(angles, test::same_variance());
     change.retreats += report.retreated ? 1 : 0;
@@ -59,6 +50,21 @@ Change change_of(const gesture::FeatureMatrix& poses, bool turned) {
 
 }  // namespace
 
+// Each row keeps the rule by which the maker's library computes abductions from what lies between
+// two fingers (drivers/cyberglove): middle = -bias * (ring + index), both as seen from the middle
+// finger.
+TEST_CASE("the rows of real signs are in the order of the sensors' bits") {
+  const auto folder = test::shared("data/gloves/libras_cyberglove");
+  if (!folder) SKIP_WITHOUT_SHARED();
+  constexpr double kBias = 0.248;
+  for (const std::string sign : {"A", "V", "4", "G", "W", "B", "O", "S"}) {
+    for (const auto& row : test::libras_rows(*folder, sign)) {
+      const double index = row[7], middle = row[11], ring = row[15];
+      CHECK(middle == Approx(-kBias * (ring + index - 2.0 * middle)).margin(1e-6));
+    }
+  }
+}
+
 TEST_CASE("ordinary real poses are changed little") {
   const auto folder = test::shared("data/gloves/libras_cyberglove");
   if (!folder) SKIP_WITHOUT_SHARED();
@@ -68,19 +74,14 @@ TEST_CASE("ordinary real poses are changed little") {
   for (const std::string sign : {"A", "V", "4", "G", "W", "B", "D", "F", "I", "L", "U", "Y", "R"}) {
     INFO(sign);
     const auto poses = test::libras_poses(*folder, sign);
-    for (const bool turned : {true, false}) {
-      const Change change = change_of(poses, turned);
-      table << "  " << sign << (turned ? " spread as hand45's " : " as written         ")
-            << change.flexion_deg << ' ' << change.spread_deg << ' ' << change.thumb_deg << ' '
-            << change.worst_gap_mm << ' ' << change.retreats << '\n';
-      CHECK(change.worst_gap_mm >= 0.0);
-      if (turned) {
-        // Thumbs that oppose touch fingers in most of these signs.
-        CHECK(change.flexion_deg < 1.0);
-        CHECK(change.spread_deg < 6.2);
-        CHECK(change.retreats < 40);
-      }
-    }
+    const Change change = change_of(poses);
+    table << "  " << sign << ' ' << change.flexion_deg << ' ' << change.spread_deg << ' '
+          << change.thumb_deg << ' ' << change.worst_gap_mm << ' ' << change.retreats << '\n';
+    CHECK(change.worst_gap_mm >= 0.0);
+    // This glove was never calibrated: knuckles reach 130 degrees, where the limit is 110.
+    CHECK(change.flexion_deg < 5.0);
+    CHECK(change.spread_deg < 6.0);
+    CHECK(change.retreats < 10);
   }
   WARN(
       "rms change of finger flexion, spread, thumb flexion [deg], worst gap after [mm], poses "

@@ -168,14 +168,14 @@ TEST_CASE("gestures of a real hand that were not recorded are near the real ones
   const auto p = performed(information, "g 1 c 3 4 p");
   std::cout << "real-pose corpus: g 1 c 3 4 p has " << p.angles.size() << " frames";
   CHECK(std::abs(static_cast<int>(p.angles.size()) - 345) <= 40);
-  const std::map<std::string, double> composed_deg{{"1", 12.4}, {"3", 19.8}, {"4", 13.6}};
-  for (const auto& [label, yardstick] : composed_deg) {
+  for (const std::string label : {"1", "3", "4"}) {
+    const double best_deg = test::best_composition_deg(*folder, label);
     const Eigen::VectorXd real =
         test::libras_poses(*folder, test::kSignOf.at(label)).colwise().mean();
     const double off = held_off_deg(p, information.model().label_index(label), real);
-    std::cout << "; " << label << " is " << off << " deg off, " << off / yardstick
+    std::cout << "; " << label << " is " << off << " deg off, " << off / best_deg
               << " of the best composition";
-    CHECK(off <= 1.25 * yardstick);
+    CHECK(off <= 1.7 * best_deg);  // 3 has its little finger from g, and c's is nearer
   }
   std::cout << '\n';
   for (const double tempo : {0.5, 0.75, 1.5, 2.0}) {

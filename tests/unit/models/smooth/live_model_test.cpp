@@ -118,11 +118,11 @@ TEST_CASE("a hand that makes none of the gestures is told so where the model doe
     with.add(followed(measured, 30.0, options, &model_with_none()), truth, 1);
     CHECK(with.accuracy() == without.accuracy());
   }
-  // Real poses of the three signs with their whole spread, then of all others.
+  // Real poses of the three signs with twice the spread that was taught, then of all others.
   for (const char* sign : {"A", "V", "4"}) {
     const int percent = none_percent(sign);
     std::cout << "sign " << sign << ", learnt: " << percent << " % of the frames none\n";
-    CHECK(percent <= 5);
+    CHECK(percent <= 25);
   }
   int others = 0, mostly_none = 0;
   for (const auto& entry : std::filesystem::directory_iterator(*shared(kLibras))) {
@@ -133,7 +133,7 @@ TEST_CASE("a hand that makes none of the gestures is told so where the model doe
     ++others;
     mostly_none += percent > 50 ? 1 : 0;
   }
-  CHECK(mostly_none >= 0.75 * others);
+  CHECK(mostly_none >= 0.95 * others);
 }
 
 TEST_CASE("poses that the model knows are steadied", "[live]") {
@@ -160,7 +160,7 @@ TEST_CASE("dropouts within the model's vocabulary are bridged", "[live]") {
   }
   std::cout << "dropouts of 8 frames, own vocabulary, lag 1: " << error.ours_deg() << " deg, held "
             << error.held_deg() << "\n";
-  CHECK(error.ours_deg() <= 0.65 * error.held_deg());
+  CHECK(error.ours_deg() <= 0.7 * error.held_deg());
 }
 
 TEST_CASE("an unknown hand is not disturbed", "[live]") {
