@@ -12,6 +12,7 @@ const HOW =
 
 export class Takes {
   #running = false;
+  #records = false;
   #asking = false;
   #stats = null; // the last that were read: an answer is newer than those
 
@@ -55,16 +56,19 @@ export class Takes {
 
   #obstacle() {
     if (this.form.hidden) return 'no take begins: a replay is not recorded';
-    if (this.fields.hidden) return `no take begins, because posed does not record. ${HOW}`;
+    if (!this.#records) return `no take begins, because posed does not record. ${HOW}`;
     return this.fields.disabled ? `no take begins: ${this.fields.title}` : '';
   }
 
   update(stats, readOnlyReason) {
     this.form.hidden = !stats || stats.replay_file !== '';
     if (this.form.hidden) return;
-    this.fields.hidden = stats.recorder_file === '';
-    this.form.dataset.recording = !this.fields.hidden;
-    if (this.fields.hidden) {
+    this.#records = stats.recorder_file !== '';
+    this.form.dataset.recording = this.#records;
+    if (!this.#records) {
+      this.#run(false);
+      this.name.hidden = true;
+      this.fields.disabled = false; // the button says what to do
       write(this.words, 'not recording');
       this.words.title = HOW;
       return;

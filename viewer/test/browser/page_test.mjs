@@ -411,6 +411,23 @@ pageTests(
       await acknowledged(page, 'take ends');
       assert.deepEqual(takes(), [true, false]);
     },
+    "a stream's name is not broken to make room for its figures": async (page) => {
+      const lines = await page
+        .locator('.stream', { hasText: 'hand' })
+        .first()
+        .evaluate((row) => {
+          const whole = row.cloneNode(true);
+          whole.querySelector('strong').textContent = 'camera-right';
+          for (const number of whole.querySelectorAll('.number')) number.textContent = '109 ms later';
+          row.parentElement.append(whole);
+          const name = document.createRange();
+          name.selectNodeContents(whole.querySelector('strong'));
+          const { length } = name.getClientRects();
+          whole.remove();
+          return length;
+        });
+      assert.equal(lines, 1);
+    },
     'a daemon that does not record says how to': async (page, bridge) => {
       bridge.daemon.recording = false;
       bridge.publishStats();
@@ -420,7 +437,10 @@ pageTests(
       assert.equal(await page.getByLabel('Take name').isVisible(), false);
       await page.locator('.stage canvas').focus();
       await page.keyboard.press('s');
-      await acknowledged(page, 'no take begins, because posed does not record');
+      const why = page.locator('.ack', { hasText: 'no take begins, because posed does not record' });
+      await why.waitFor(PATIENCE);
+      await page.getByRole('button', { name: 'Start take' }).click(); // where nothing can hover, too
+      await why.nth(1).waitFor(PATIENCE);
       assert.ok(bridge.requests.every((request) => !request.take));
     },
     "the hands' view stays as turned, and a still scene rests": async (page, bridge) => {
