@@ -1,5 +1,6 @@
 // The camera and the worker that finds hands in its pictures. Nothing is opened or loaded before
-// start(); stop() ends the camera's tracks and the worker at once.
+// start(), which loads while the browser asks its user; stop() ends the camera's tracks and the
+// worker at once.
 
 const WORKER = '/camera/finder.js';
 const WIDTH = 640;
@@ -34,6 +35,7 @@ export class Camera {
   async start(deviceId) {
     this.stop();
     const run = this.#run;
+    this.#load();
     const stream = await navigator.mediaDevices.getUserMedia({
       audio: false,
       video: {
@@ -45,7 +47,6 @@ export class Camera {
     if (run !== this.#run) return end(stream);
     this.#stream = stream;
     stream.getVideoTracks()[0].onended = () => this.#end('the camera is gone');
-    this.#load();
     this.video.srcObject = stream;
     await this.video.play();
     this.#next(run);
@@ -64,8 +65,7 @@ export class Camera {
   }
 
   #end(sentence) {
-    if (!this.running) return;
-    this.stop();
+    this.stop(); // also while the browser asks
     this.handlers.ended(sentence);
   }
 

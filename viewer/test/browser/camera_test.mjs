@@ -61,7 +61,21 @@ test('a hand before the camera is sent, until the page may not or is hidden', op
   await button(page).waitFor(PATIENCE);
   await page.getByText('The picture stays in this browser').waitFor(PATIENCE);
   assert.deepEqual(await panelOf(page), { running: false, frames: 0, found: 0 });
+  await page.evaluate(() => {
+    const { mediaDevices } = navigator;
+    const asked = new Promise((answer) => {
+      globalThis.answer = answer;
+    });
+    mediaDevices.getUserMedia = async (what) => {
+      await asked;
+      delete mediaDevices.getUserMedia;
+      return mediaDevices.getUserMedia(what);
+    };
+  });
+  const loading = page.waitForRequest(/finder\.js/, PATIENCE); // while the user is asked
   await button(page).click();
+  await loading;
+  await page.evaluate(() => globalThis.answer());
   await enough(page, ENOUGH);
   await keepTrack(page);
   const { frames, found } = await panelOf(page);
