@@ -19,9 +19,10 @@ RT_SAFE float narrow(double value) noexcept {
                                        : std::numeric_limits<float>::quiet_NaN();
 }
 
-RT_SAFE double number_or(JsonReader& json, double otherwise) noexcept {
+// `none` where the value is no number.
+RT_SAFE double number_of(JsonReader& json, double none) noexcept {
   double value = 0.0;
-  return json.number(value) ? value : otherwise;
+  return json.number(value) ? value : none;
 }
 
 // True if there are exactly 63 numbers; a longer list is left at once.
@@ -63,7 +64,7 @@ RT_SAFE void read_side(JsonReader& json, TrackedHand& hand, bool& sided) noexcep
 }
 
 RT_SAFE void read_hand(JsonReader& json, TrackedHand& hand) noexcept {
-  bool whole = false, sided = false;
+  bool whole = false, sided = false, told = true;
   hand.score = 1.0;
   hand.sure = false;
   if (json.enter_object()) {
@@ -71,9 +72,9 @@ RT_SAFE void read_hand(JsonReader& json, TrackedHand& hand) noexcept {
       if (key == "side") {
         read_side(json, hand, sided);
       } else if (key == "sure") {
-        if (!json.boolean(hand.sure)) hand.sure = false;
+        told = json.boolean(hand.sure);
       } else if (key == "score") {
-        hand.score = number_or(json, kNone);
+        hand.score = number_of(json, kNone);
       } else if (key == "points") {
         whole = read_points(json, hand.point_m);
       } else {
@@ -82,7 +83,8 @@ RT_SAFE void read_hand(JsonReader& json, TrackedHand& hand) noexcept {
     }
   }
   const bool near = std::ranges::all_of(hand.point_m, is_plausible);
-  const bool sound = sided && hand.score >= 0.0 && hand.score <= 1.0 && near;  // false for NaN
+  const bool sound =
+      sided && told && hand.score >= 0.0 && hand.score <= 1.0 && near;  // false for NaN
   hand.outcome = Outcome::kOk;
   if (!whole) {
     hand.outcome = Outcome::kShort;
@@ -91,9 +93,10 @@ RT_SAFE void read_hand(JsonReader& json, TrackedHand& hand) noexcept {
   }
 }
 
-// False when there are more than two, or two that are surely of one side.
-RT_SAFE bool read_hands(JsonReader& json, Message& message) noexcept {
-  if (!json.enter_array()) return true;
+// False when there are more than two, or two that are surely of one side. `listed`: it is a list.
+RT_SAFE bool read_hands(JsonReader& json, Message& message, bool& listed) noexcept {
+  listed = json.enter_array();
+  if (!listed) return true;
   while (json.next()) {
     if (message.count == kMaxHands) return false;
     read_hand(json, message.hands[message.count++]);
@@ -108,6 +111,8 @@ struct Head {
   bool landmarks = false;
   double version = 0.0;
   bool in_range = true;
+  bool whole = true;  // each member that is named above is of its kind
+  bool hands = false;
 };
 
 RT_SAFE void read_member(JsonReader& json, std::string_view key, Head& head,
@@ -116,13 +121,17 @@ RT_SAFE void read_member(JsonReader& json, std::string_view key, Head& head,
     std::string_view kind;
     head.landmarks = json.text(kind) && kind == "landmarks";
   } else if (key == "version") {
-    head.version = number_or(json, 0.0);
+    head.version = number_of(json, 0.0);
   } else if (key == "time_ns") {
-    message.time_s = number_or(json, kNone) * 1e-9;
+    double time_ns = 0.0;
+    const bool number = json.number(time_ns);
+    head.whole = number && head.whole;
+    head.in_range = (!number || std::isfinite(time_ns)) && head.in_range;
+    message.time_s = time_ns * 1e-9;
   } else if (key == "end") {
-    if (!json.boolean(message.end)) message.end = false;
+    head.whole = json.boolean(message.end) && head.whole;
   } else if (key == "hands") {
-    head.in_range = read_hands(json, message) && head.in_range;
+    head.in_range = read_hands(json, message, head.hands) && head.in_range;
   } else {
     json.skip();
   }
@@ -144,7 +153,8 @@ RT_SAFE Outcome read_message(std::string_view json, Message& message) noexcept {
   if (!head.in_range || reader.fault() == JsonReader::Fault::kDeep) return Outcome::kOutOfRange;
   if (!reader.ok()) return Outcome::kShort;
   if (!head.landmarks || head.version != 1.0) return Outcome::kForeign;
-  return reader.at_end() ? Outcome::kOk : Outcome::kShort;
+  const bool whole = head.whole && (head.hands || message.end);
+  return whole && reader.at_end() ? Outcome::kOk : Outcome::kShort;
 }
 
 std::string write_message(const Message& message) {

@@ -67,9 +67,10 @@ struct Message {
   bool end = false;
 };
 
-// kForeign: not of this format or version; kShort: cut, or no JSON; kOutOfRange: more than two
-// hands, or two that are surely of one side. A single hand may be wrong by itself: kShort with
-// another number of points, kOutOfRange with numbers that are no hand.
+// kForeign: not of this format or version; kShort: cut, no JSON, no list of hands, or a member of
+// another kind; kOutOfRange: more than two hands, two that are surely of one side, or no time. A
+// single hand may be wrong by itself: kShort with another number of points, kOutOfRange with
+// numbers that are no hand.
 RT_SAFE [[nodiscard]] Outcome read_message(std::string_view json, Message& message) noexcept;
 
 // The message as a tracker sends it; its time is finite. Cold.

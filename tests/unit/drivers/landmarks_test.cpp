@@ -311,6 +311,17 @@ TEST_CASE("what is no hand of a tracker is refused and counted") {
   CHECK(rig.feed(message_of(good) + "x") == Outcome::kShort);
   CHECK(rig.feed(message_of(good).substr(0, 300)) == Outcome::kShort);
   CHECK(rig.sink.frames.empty());
+  // What a misspelt or empty variable of a tracker leaves is no hand that has gone.
+  for (const char* wrong :
+       {R"("hands":null)", R"("hands":{})", R"("hand":[])", R"("end":"yes")",
+        R"("hands":[],"end":1)", R"("hands":[],"time_ns":"now")", R"("hands":[],"time_ns":null)"}) {
+    INFO(wrong);
+    CHECK(rig.feed(R"({"posed":"landmarks","version":1,)" + std::string(wrong) + "}") ==
+          Outcome::kShort);
+  }
+  CHECK(rig.feed(message_of("", R"("version":1,"time_ns":1e999)")) == Outcome::kOutOfRange);
+  std::string unsure = good;
+  CHECK(rig.feed(message_of(unsure.insert(1, R"("sure":"yes",)"))) == Outcome::kOutOfRange);
   // Time: the same again, and one that was overtaken.
   CHECK(rig.feed(message_of(good, R"("version":1,"time_ns":2000000000)")) == Outcome::kOk);
   CHECK(rig.feed(message_of(good, R"("version":1,"time_ns":2000000000)")) == Outcome::kDuplicate);
