@@ -50,6 +50,9 @@ struct SourceType {
   static Result<Opened> open(const Options& options, auto& settings, TransportFactory& ports) {
     auto identity = TRY(Self::check(options, settings));
     auto transport = TRY(Self::connect(options, ports));
+    // With port 0 the kernel chooses one, which the senders must know.
+    const auto* udp = dynamic_cast<const UdpTransport*>(transport.get());
+    if (udp != nullptr && identity.ends_with(":0")) identity = "udp " + udp->endpoint(0);
     return Opened{
         .identity = std::move(identity), .transport = std::move(transport), .poll = Self::poll()};
   }

@@ -145,9 +145,10 @@ RT_SAFE Outcome VmcDecoder::accept_packet(std::span<const std::byte> packet, Sin
     end_.missed();
     end_frame(before_ns, sink);
   }
-  each_message(packet, [this](const OscMessage& message) noexcept {
+  const bool all_read = each_message(packet, [this](const OscMessage& message) noexcept {
     if (!accept_message(message)) note(Outcome::kOutOfRange);
   });
+  if (!all_read) note(Outcome::kOutOfRange);
   if (end_.ends(found.received, arrival_ns_, set_.any())) end_frame(clock_.device_ns(), sink);
   const bool batch_is_over = set_.none() && (applied_ || ended_);
   if (batch_is_over && values_.fresh()) emit_sample(sink);

@@ -72,11 +72,12 @@ RT_SAFE bool holds(std::span<const std::byte> arguments, std::string_view types)
   return open_arrays == 0;
 }
 
+// A message in a bundle may hold anything: its size says where the next one begins.
 RT_SAFE bool is_valid_packet(std::span<const std::byte> packet, int depth) noexcept {
   if (packet.empty() || packet.size() % 4 != 0) return false;
   if (!is_bundle(packet)) {
     OscMessage message;
-    return read_message(packet, message) && holds(message.arguments, message.types);
+    return depth > 0 || read_message(packet, message);
   }
   if (depth >= kMaxBundleDepth || packet.size() < kBundleHeadBytes) return false;
   BigEndianReader reader(packet.subspan(kBundleHeadBytes));
@@ -135,7 +136,7 @@ RT_SAFE bool read_message(std::span<const std::byte> bytes, OscMessage& message)
   if (!read_text(reader, bytes, message.types) || !message.types.starts_with(',')) return false;
   message.types.remove_prefix(1);
   message.arguments = bytes;
-  return true;
+  return holds(message.arguments, message.types);
 }
 
 RT_SAFE Outcome check_packet(std::span<const std::byte> packet) noexcept {

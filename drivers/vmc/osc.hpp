@@ -7,8 +7,9 @@
 //   types     i i32, f f32, s S text 0.., b i32 size and bytes, h d t 8 bytes, c r m 4 bytes,
 //             T F N I nothing
 //
-// A packet is checked as a whole before anything of it is used; reading it cannot fail afterwards,
-// except that an argument is missing or has another type. RT-safe.
+// A packet is checked as a whole before anything of it is used. A message of a bundle that cannot
+// be read, such as one with a type of a later OSC, is passed over, because the bundle says its
+// size; of the others, an argument may be missing or have another type. RT-safe.
 #pragma once
 
 #include <cstddef>
@@ -58,27 +59,31 @@ class OscArguments {
   bool ok_ = true;
 };
 
-// kForeign: neither a message nor a bundle; kShort: cut, a size that is wrong, an unknown type, or
-// too many bundles in bundles.
+// kForeign: neither a message nor a bundle; kShort: cut, a size that is wrong, too many bundles in
+// bundles, or a single message that cannot be read.
 [[nodiscard]] Outcome check_packet(std::span<const std::byte> packet) noexcept;
 
-// Reads a message of a checked packet; false for one that is broken. A message without types has
-// no arguments.
+// Reads a message of a checked packet; false for one that is broken or has an unknown type. A
+// message without types has no arguments.
 [[nodiscard]] bool read_message(std::span<const std::byte> bytes, OscMessage& message) noexcept;
 
 [[nodiscard]] bool is_bundle(std::span<const std::byte> packet) noexcept;
 inline constexpr std::size_t kBundleHeadBytes = 16;
 
-// Calls handle(message) for each message of a checked packet, in their order.
+// Calls handle(message) for each message of a checked packet, in their order; returns false if some
+// could not be read.
 template <typename Handle>
-void each_message(std::span<const std::byte> packet, Handle&& handle) noexcept {
+bool each_message(std::span<const std::byte> packet, Handle&& handle) noexcept {
   if (!is_bundle(packet)) {
     OscMessage message;
-    if (read_message(packet, message)) handle(message);
-    return;
+    if (!read_message(packet, message)) return false;
+    handle(message);
+    return true;
   }
+  bool all = true;
   BigEndianReader reader(packet.subspan(kBundleHeadBytes));
-  while (reader.left() != 0) each_message(reader.bytes(reader.u32()), handle);
+  while (reader.left() != 0) all &= each_message(reader.bytes(reader.u32()), handle);
+  return all;
 }
 
 }  // namespace posed::drivers::vmc

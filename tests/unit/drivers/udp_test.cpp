@@ -95,6 +95,18 @@ void check_refused(const UdpSettings& settings, const std::string& word) {
 
 }  // namespace
 
+TEST_CASE("a source names the port that the kernel chose") {
+  TransportFactory ports;
+  for (const char* driver : {"vmc", "mvn", "mocopi", "rokoko"}) {
+    INFO(driver);
+    const auto device = find_driver(driver)->open({{"listen", std::string("127.0.0.1:0")}}, ports);
+    REQUIRE(device);
+    const auto& udp = dynamic_cast<const UdpTransport&>(*device->transport);
+    CHECK(device->description.identity == "udp " + udp.endpoint(0));
+    CHECK_FALSE(device->description.identity.ends_with(":0"));
+  }
+}
+
 TEST_CASE("datagrams come one by one, over IPv4 and IPv6") {
   for (const char* own : {"127.0.0.1:0", "[::1]:0"}) {
     INFO(own);
