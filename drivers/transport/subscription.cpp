@@ -6,6 +6,7 @@
 #include <chrono>
 #include <csignal>
 #include <cstring>
+#include <mutex>
 #include <span>
 #include <utility>
 
@@ -85,11 +86,23 @@ Result<> check_subscription(const SubscriptionSettings& settings) {
   return {};
 }
 
+Result<std::shared_ptr<net::Context>> subscription_context() {
+  static std::mutex mutex;
+  static std::weak_ptr<net::Context> open;
+  const std::scoped_lock lock(mutex);
+  // Opened first in any case, because that tells whether the threads of one more link may begin.
+  auto fresh = TRY(net::open_context());
+  if (auto known = open.lock()) return known;
+  auto made = std::make_shared<net::Context>(std::move(fresh));
+  open = made;
+  return made;
+}
+
 Result<std::unique_ptr<SubscriptionTransport>> SubscriptionTransport::open(
     const SubscriptionSettings& settings, const Cancel& cancel,
-    std::shared_ptr<PausedHosts> paused) {
+    std::shared_ptr<net::Context> context, std::shared_ptr<PausedHosts> paused) {
   std::unique_ptr<SubscriptionTransport> made(
-      new SubscriptionTransport(settings, std::move(paused)));
+      new SubscriptionTransport(settings, std::move(context), std::move(paused)));
   TRY(made->connect());
   TRY(made->await_link(cancel));
   made->thread_ = std::thread([transport = made.get()] { transport->receive_all(); });
@@ -97,8 +110,13 @@ Result<std::unique_ptr<SubscriptionTransport>> SubscriptionTransport::open(
 }
 
 SubscriptionTransport::SubscriptionTransport(const SubscriptionSettings& settings,
+                                             std::shared_ptr<net::Context> context,
                                              std::shared_ptr<PausedHosts> paused)
-    : settings_(settings), paused_(std::move(paused)), outgoing_(kMaxChunk), incoming_(kMaxChunk) {}
+    : settings_(settings),
+      paused_(std::move(paused)),
+      context_(std::move(context)),
+      outgoing_(kMaxChunk),
+      incoming_(kMaxChunk) {}
 
 SubscriptionTransport::~SubscriptionTransport() {
   stop_.signal();
@@ -118,10 +136,9 @@ Result<> SubscriptionTransport::connect() {
   reader_ = ends[0];
   writer_ = ends[1];
   ::setsockopt(writer_, SOL_SOCKET, SO_SNDBUF, &kQueue, sizeof kQueue);
-  context_ = TRY(net::open_context());
-  socket_ = TRY(net::open_socket(context_.get(), ZMQ_SUB));
+  socket_ = TRY(net::open_socket(context_->get(), ZMQ_SUB));
   TRY(set_all(socket_.get(), settings_));
-  monitor_ = TRY(net::LinkMonitor::open(context_.get(), socket_.get(), !settings_.key.empty()));
+  monitor_ = TRY(net::LinkMonitor::open(context_->get(), socket_.get(), !settings_.key.empty()));
   return net::connect_socket(socket_.get(), settings_.endpoint);
 }
 

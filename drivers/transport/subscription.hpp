@@ -36,12 +36,18 @@ struct SubscriptionSettings {
 // Checks the endpoint and reads the key files, without connecting. Cold.
 Result<> check_subscription(const SubscriptionSettings& settings);
 
+// The context of all subscriptions, while somebody keeps it. Memory that libzmq's thread took for a
+// peer that sends too much stays with that thread where posed locks its memory (mlockall): the
+// next link, of whichever source, uses it again. Cold; any thread.
+Result<std::shared_ptr<net::Context>> subscription_context();
+
 class SubscriptionTransport final : public Transport, public Upkeep {
  public:
   // Waits for the connection for up to a second, or until `cancel` fires. If it floods, it ends,
   // and `paused` is told. Cold.
   static Result<std::unique_ptr<SubscriptionTransport>> open(const SubscriptionSettings& settings,
                                                              const Cancel& cancel,
+                                                             std::shared_ptr<net::Context> context,
                                                              std::shared_ptr<PausedHosts> paused);
   ~SubscriptionTransport() override;
 
@@ -56,7 +62,8 @@ class SubscriptionTransport final : public Transport, public Upkeep {
   [[nodiscard]] std::string consume_note() override;
 
  private:
-  SubscriptionTransport(const SubscriptionSettings& settings, std::shared_ptr<PausedHosts> paused);
+  SubscriptionTransport(const SubscriptionSettings& settings, std::shared_ptr<net::Context> context,
+                        std::shared_ptr<PausedHosts> paused);
   Result<> connect();
   Result<> await_link(const Cancel& cancel);
   // The thread: receives until the link or the object ends.
@@ -70,7 +77,7 @@ class SubscriptionTransport final : public Transport, public Upkeep {
   Flood flood_;
   std::uint64_t number_ = Chunk::kLink;  // tells this link from the ones before it
   bool is_reported_ = false;
-  net::Context context_;
+  std::shared_ptr<net::Context> context_;
   net::Socket socket_;
   std::unique_ptr<net::LinkMonitor> monitor_;  // ends before the socket
   int reader_ = -1, writer_ = -1;              // the two ends of the queue

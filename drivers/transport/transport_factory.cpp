@@ -20,7 +20,8 @@ Result<std::unique_ptr<SubscriptionTransport>> TransportFactory::subscribe(
   TRY(check_subscription(settings));
   if (only_prepare_) return not_opened();
   await_pause();
-  return SubscriptionTransport::open(settings, *cancel_, paused_);
+  subscriptions_ = TRY(subscription_context());
+  return SubscriptionTransport::open(settings, *cancel_, subscriptions_, paused_);
 }
 
 void TransportFactory::await_pause() const noexcept {

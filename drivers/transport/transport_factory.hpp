@@ -116,7 +116,8 @@ class TransportFactory {
   bool only_prepare_ = false;
   std::string note_{};
   std::uint64_t refused_ = 0;
-  std::map<std::string, Listener> listeners_;  // by endpoint
+  std::map<std::string, Listener> listeners_;    // by endpoint
+  std::shared_ptr<net::Context> subscriptions_;  // kept while the links come and go
   std::shared_ptr<PausedHosts> paused_ = std::make_shared<PausedHosts>();
 };
 

@@ -30,6 +30,10 @@ constexpr int kEvents = ZMQ_EVENT_CONNECTED | ZMQ_EVENT_HANDSHAKE_SUCCEEDED |
 // many short ones bring no more than a long one while nothing is received.
 constexpr std::uint64_t kUnseen = 384 * 1024;
 
+// Bytes that wait in all links. When they are too many, each link with more than its share is cut.
+std::atomic<std::uint64_t> unreceived_of_all{0};
+constexpr std::uint64_t kShare = kMaxUnreceived / 4;
+
 constexpr int kTick_ms = 10;  // a flood of empty parts fills about 0.7 GB a second
 
 // Bytes that a part took on the wire (ZMTP 3): the header of its frame, and of CURVE's box.
@@ -61,6 +65,13 @@ LinkMonitor::~LinkMonitor() {
   stop_.store(true);
   wake_.signal();
   if (thread_.joinable()) thread_.join();
+  static_cast<void>(note_unreceived(0));
+}
+
+bool LinkMonitor::note_unreceived(std::uint64_t bytes) noexcept {
+  const std::uint64_t before = std::exchange(unreceived_, bytes);
+  const std::uint64_t all = unreceived_of_all.fetch_add(bytes - before) + bytes - before;
+  return bytes <= (all <= kMaxUnreceived ? kMaxUnreceived : kShare);
 }
 
 void LinkMonitor::watch() {
@@ -135,6 +146,7 @@ Refusal LinkMonitor::handle(std::uint16_t event, int value) {
     case ZMQ_EVENT_DISCONNECTED: {
       fd_ = -1;
       before_ += std::exchange(arrived_, 0) + kUnseen;
+      static_cast<void>(note_unreceived(0));
       const bool was_cut = std::exchange(is_cut_, false);
       if (was_cut) malloc_trim(0);
       const bool known = std::exchange(failure_known_, false);
@@ -167,7 +179,7 @@ void LinkMonitor::inspect() {
   arrived_ = received_bytes(fd_);
   const std::uint64_t all = before_ + arrived_;
   accounted_ = std::min(accounted_, all);
-  if (all - accounted_ <= kMaxUnreceived) return;
+  if (note_unreceived(all - accounted_)) return;
   is_cut_ = true;
   // libzmq's thread may have closed the connection since then, and its descriptor may have been
   // reused.

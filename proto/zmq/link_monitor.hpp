@@ -37,8 +37,8 @@ enum class Refusal : std::uint8_t {
 // Bytes of one part; the stats of 256 streams have about 200 KB. libzmq ends the connection at a
 // larger one.
 inline constexpr std::int64_t kMaxReceivedPart = 1024 * 1024;
-// Bytes that may have arrived without being received: more than a part, and as many empty parts as
-// take 48 MB.
+// Bytes that may have arrived in all links without being received: more than a part, and as many
+// empty parts as take 48 MB.
 inline constexpr std::uint64_t kMaxUnreceived = 3 * 1024 * 1024 / 2;
 
 class LinkMonitor {
@@ -80,6 +80,8 @@ class LinkMonitor {
   [[nodiscard]] Refusal handle(std::uint16_t event, int value);
   [[nodiscard]] bool is_connected() const noexcept { return fd_ >= 0; }
   void inspect();
+  // Tells all links how much waits in this one; returns whether that is allowed.
+  [[nodiscard]] bool note_unreceived(std::uint64_t bytes) noexcept;
 
   void* socket_;
   const bool with_key_;
@@ -94,6 +96,7 @@ class LinkMonitor {
   int fd_ = -1;                       // the connection's descriptor; -1: none
   std::uint64_t cookie_ = 0;          // and its id
   bool is_cut_ = false;
+  std::uint64_t unreceived_ = 0;  // bytes, as of the last look
   // Bytes that have arrived: in earlier connections, in this one as of the last look, and in all
   // when nothing waited to be received; and how many belong to parts that were received.
   std::uint64_t before_ = 0, arrived_ = 0, when_empty_ = 0, accounted_ = 0;

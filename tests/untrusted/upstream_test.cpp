@@ -107,7 +107,9 @@ TEST_CASE("whoever has the daemon's port cannot fill the memory of those that co
         arguments.insert(arguments.end(), {"--port", "0", "--page", folder.path().string()});
       }
       Process process(arguments);
-      const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(2);
+      // Where a daemon locks its memory it gives none back: later links use that of earlier ones.
+      const std::chrono::seconds attack(command == "run" ? 4 : 2);
+      const auto end = std::chrono::steady_clock::now() + attack;
       double most_MB = 0.0;
       while (std::chrono::steady_clock::now() < end) {
         most_MB = std::max(most_MB, memory_MB(process.pid()));

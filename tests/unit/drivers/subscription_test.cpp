@@ -59,6 +59,17 @@ TEST_CASE("a message becomes a chunk: topic, zero byte, body; other topics are l
   CHECK(rig.transport->read(0).bytes.empty());
 }
 
+TEST_CASE("the context of a subscription outlives its link") {
+  SubscriptionRig rig;
+  const std::weak_ptr<net::Context> context = subscription_context().value();
+  rig.transport.reset();
+  CHECK_FALSE(context.expired());
+  TransportFactory other;
+  auto second = other.subscribe({.endpoint = rig.endpoint, .topics = {"pose/ann"}});
+  REQUIRE(second);
+  CHECK(context.lock() == subscription_context().value());
+}
+
 TEST_CASE("when nobody reads, the newest messages stay and the others are counted") {
   SubscriptionRig rig;
   constexpr std::uint32_t kSent = 500;
