@@ -93,15 +93,16 @@ Result<> begin_program() {
   return check_stack();
 }
 
-// The exit code, or 1 if the output could not be written (a full disk). A reader that has gone has
-// read what it wanted; that is not a failure, and nothing is printed.
+// The exit code, 1 in place of 0 if the output could not be written (a full disk). A reader that
+// has gone has read what it wanted; that is not a failure, and nothing is printed.
 int with_stdout_written(int exit_code) {
   errno = 0;
   if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return exit_code;
   const std::string why = errno == 0 ? "" : " (" + errno_text() + ")";
-  if (exit_code != 0 || reader_of_stdout_has_gone()) return exit_code;
-  return report(
-      fail("the output cannot be written to stdout" + why + "; it is not complete").error());
+  if (reader_of_stdout_has_gone()) return exit_code;
+  const int failed =
+      report(fail("the output cannot be written to stdout" + why + "; it is not complete").error());
+  return exit_code != 0 ? exit_code : failed;
 }
 
 // The subcommand of `app` that bears this name; null if there is none.

@@ -70,4 +70,10 @@ TEST_CASE("a command that gets too little of the system says so, and no signal e
   CHECK(posed({"replay", log, "--speed", "max", "--expect"}).code == 0);
 }
 
+TEST_CASE("output that is lost is told, also by a command that fails") {
+  const ProgramOutcome outcome = limited("exec >/dev/full", {"doctor"});
+  CHECK(outcome.code != 0);
+  CHECK(has(outcome.err, "the output cannot be written to stdout"));
+}
+
 }  // namespace posed::test
