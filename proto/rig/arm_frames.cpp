@@ -71,13 +71,14 @@ bool Frames::arms_are_real(const Both& way, const std::array<std::optional<Vec>,
   const Vec left = Tc * direction(way[0]);
   const Vec right = Tc * direction(way[1]);
   if (angle_deg(mirrored_x(left), right) >= 25 && !arms_slant(way, left, right)) return false;
+  constexpr double kUp_deg = 25;  // folded arms go on as the trunk does
   double palm_off_deg = 0.0;
   double least_raise_deg = 180.0;
   for (const Side side : kSides) {
     const Vec arm_way = side == Side::kLeft ? left : right;
     const auto collar = rest(on(side, Bone::kLeftShoulder), {on(side, Bone::kLeftUpperArm)});
     const double raise_deg = angle_deg(arm_way, outwards(side));
-    if (raise_deg >= 120 || angle_deg(arm_way, kY) <= 50) return false;
+    if (raise_deg >= 120 || angle_deg(arm_way, kY) <= kUp_deg) return false;
     if (collar && angle_deg(Tc * *collar, outwards(side)) >= 65) return false;
     least_raise_deg = std::min(least_raise_deg, raise_deg);
     if (const auto& across_palm = palms[which(side)]) {

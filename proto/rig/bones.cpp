@@ -79,9 +79,23 @@ void keep_if_any(std::vector<int>& joints, const auto& is_wanted) {
   if (!kept.empty()) joints = std::move(kept);
 }
 
-// The chain above the arms that holds no arm: neck and head where neither is named.
-std::vector<int> chain_above(const Figure& figure, const std::vector<JointName>& names,
-                             const BoneJoints& bones, int chest) {
+// Whether hands end without tips: then a head has none either.
+bool hands_lack_tips(const Figure& figure, const BoneJoints& bones) {
+  return std::ranges::all_of(kSides, [&](Side side) {
+    const int hand = bones[on(side, Bone::kLeftHand)];
+    return hand >= 0 && std::ranges::all_of(figure.children(hand), [&](int child) {
+             const auto finger = figure.main_chain(child);
+             const bool in_palm = finger.size() > 1 &&
+                                  figure[finger[0]].offset.norm() < figure[finger[1]].offset.norm();
+             return std::ssize(finger) == kFingerJoints + (in_palm ? 1 : 0);
+           });
+  });
+}
+
+// Where the chain of neck and head begins, if neither is named: above the arms, and with no arm
+// below it. -1 where there is none.
+int first_above(const Figure& figure, const std::vector<JointName>& names, const BoneJoints& bones,
+                int chest) {
   std::vector<int> rest;
   for (const int child : figure.children(chest)) {
     bool holds_limb = false;
@@ -102,13 +116,21 @@ std::vector<int> chain_above(const Figure& figure, const std::vector<JointName>&
     const auto tip = figure.between(chest, figure.main_chain(j).back()).value_or(Vec::Zero());
     return tip.dot(trunk) > 0.0;
   });
-  if (rest.empty()) return {};
   const auto length = [&figure](int j) {
     double sum = 0.0;
     for (const double segment : figure.segments(figure.main_chain(j))) sum += segment;
     return sum;
   };
-  const int first = *std::ranges::max_element(rest, {}, length);
+  return rest.empty() ? -1 : *std::ranges::max_element(rest, {}, length);
+}
+
+// The chain above the arms, or above a neck, that holds no arm.
+std::vector<int> chain_above(const Figure& figure, const std::vector<JointName>& names,
+                             const BoneJoints& bones, int chest) {
+  const int first = first_above(figure, names, bones, chest);
+  if (first < 0) return {};
+  const bool from_chest = figure.below(chest, bones[Bone::kLeftUpperArm]);
+  const bool lacks_tips = from_chest && hands_lack_tips(figure, bones);
   std::vector<int> chain;
   const double thigh = figure.between(bones[Bone::kLeftUpperLeg], bones[Bone::kLeftLowerLeg])
                            .value_or(Vec::Zero())
@@ -125,8 +147,8 @@ std::vector<int> chain_above(const Figure& figure, const std::vector<JointName>&
     way += step;
     const bool ends = figure.children(j).empty() && figure.end_length(j) <= 0.0;
     const double neck = std::max(kNeck * way.norm(), kNeckOfThigh * thigh);
-    const bool is_head =
-        chain.size() == 1 ? step.norm() <= neck : chain.size() > 1 && goes_on(figure, names, j);
+    const bool is_head = chain.size() == 1 ? lacks_tips || step.norm() <= neck
+                                           : chain.size() > 1 && goes_on(figure, names, j);
     const bool tip = ends && !is_head;
     if (!tip && !names[j].has("end") && !names[j].has("nub")) chain.push_back(j);
     const auto is_twin = [&figure](int child) { return has_twin(figure, child); };
@@ -136,7 +158,7 @@ std::vector<int> chain_above(const Figure& figure, const std::vector<JointName>&
   // The top of a head is nearer to its end than to the head.
   const double end = chain.empty() ? 0.0 : figure.end_length(chain.back());
   if (chain.size() > 2 && figure.children(chain.back()).empty() && end > 0.0 &&
-      figure[chain.back()].offset.norm() > 1.3 * end) {
+      !goes_on(figure, names, chain.back()) && figure[chain.back()].offset.norm() > 1.3 * end) {
     chain.pop_back();
   }
   // A face and a nose are on the head.

@@ -51,6 +51,24 @@ struct Borrowed {
   int above = 0;
 };
 
+// A joint that is left of a limb is the bone that the other limb's joint of its name is.
+void name_stump(const std::vector<JointName>& names, const BorrowedLimb& limb, Side side,
+                BoneJoints& bones) {
+  const Side other = side == Side::kLeft ? Side::kRight : Side::kLeft;
+  const BoneJoints before = bones;
+  for (int k = 0; k < kBorrowedBones; ++k) {
+    const int mine = before[on(side, bone_after(limb.first, k))];
+    for (int of = 0; mine >= 0 && of < kBorrowedBones; ++of) {
+      const int theirs = before[on(other, bone_after(limb.first, of))];
+      const bool is_same = theirs >= 0 && names[mine].stem == names[theirs].stem &&
+                           names[mine].digits == names[theirs].digits;
+      if (!is_same || of == k) continue;
+      bones.set(on(side, bone_after(limb.first, k)), -1);
+      bones.set(on(side, bone_after(limb.first, of)), mine);
+    }
+  }
+}
+
 // The limb of `side` as the mirror image of the other one's, below what is there of it.
 void borrow(const Figure& figure, const std::vector<JointName>& names, const BoneJoints& bones,
             const BorrowedLimb& limb, Side side, const Mat& mirror, std::vector<Borrowed>& out) {
@@ -108,7 +126,7 @@ RigPoses mirrored_poses(const RigPoses& poses, const Figure& figure, const Mat& 
 
 std::optional<WholePerson> with_borrowed_limbs(const RigInput& input, const Figure& figure,
                                                const std::vector<JointName>& names,
-                                               const BoneJoints& bones) {
+                                               BoneJoints bones) {
   const auto both = [&bones](const BorrowedLimb& limb) {
     return is_whole(bones, limb, Side::kLeft) && is_whole(bones, limb, Side::kRight);
   };
@@ -118,6 +136,7 @@ std::optional<WholePerson> with_borrowed_limbs(const RigInput& input, const Figu
   const bool has_left = is_whole(bones, lost, Side::kLeft);
   if (!has_left && !is_whole(bones, lost, Side::kRight)) return std::nullopt;
   const Side side = has_left ? Side::kRight : Side::kLeft;
+  name_stump(names, lost, side, bones);
   const Vec line = line_between(figure, bones, has_legs ? kBorrowedLeg : kBorrowedArm);
   if (!(line.norm() > 0.0)) return std::nullopt;
   const Mat mirror = Mat::Identity() - 2.0 * line * line.transpose();

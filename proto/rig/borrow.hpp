@@ -21,6 +21,6 @@ struct WholePerson {
 [[nodiscard]] std::optional<WholePerson> with_borrowed_limbs(const RigInput& input,
                                                              const Figure& figure,
                                                              const std::vector<JointName>& names,
-                                                             const BoneJoints& bones);
+                                                             BoneJoints bones);
 
 }  // namespace posed::rig

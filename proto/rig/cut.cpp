@@ -26,7 +26,7 @@ double unlike(double one, double other) {
   return std::abs(std::log(std::max(one, 1e-9) / std::max(other, 1e-9)));
 }
 
-CutLimb::CutLimb(const Figure& figure, int one, int other)
+CutLimb::CutLimb(const Figure& figure, int one, int other, int palm)
     : chain_(figure.main_chain(one)),
       to_first_((figure[one].offset - figure[other].offset).norm() / 2) {
   auto segments = figure.segments(chain_);
@@ -34,11 +34,14 @@ CutLimb::CutLimb(const Figure& figure, int one, int other)
   segments.resize(std::min({segments.size(), others.size(), kMaxCutJoints}));
   for (std::size_t i = 0; i < segments.size(); ++i) segments[i] = std::min(segments[i], others[i]);
   chain_.resize(segments.size());
+  const auto hand = std::ranges::find(chain_, palm);
+  if (hand - chain_.begin() > 1 && hand != chain_.end()) arm_end_ = hand - chain_.begin();
   measure(figure, segments);
 }
 
 CutLimb::CutLimb(const Figure& figure, std::vector<int> chain, bool has_end)
-    : chain_(std::move(chain)), has_end_(has_end && chain_.size() <= kMaxCutJoints) {
+    : chain_(std::move(chain)) {
+  if (has_end && chain_.size() <= kMaxCutJoints) leg_end_ = arm_end_ = chain_.size() - 1;
   chain_.resize(std::min(chain_.size(), kMaxCutJoints));
   std::vector<double> segments;
   for (std::size_t i = 1; i < chain_.size(); ++i) {
@@ -60,13 +63,15 @@ void CutLimb::measure(const Figure& figure, const std::vector<double>& segments)
   }
 }
 
-std::optional<TwoBones> CutLimb::least(auto cost_of_limb) const {
+std::optional<TwoBones> CutLimb::least(std::optional<std::size_t> known_end,
+                                       auto cost_of_limb) const {
   std::optional<TwoBones> found;
   double least = 1e300;
   const std::size_t count = chain_.size();
   for (std::size_t begin = 0; begin + 2 < count; ++begin) {
     for (std::size_t bend = begin + 1; bend + 1 < count; ++bend) {
-      for (std::size_t end = has_end_ ? count - 1 : bend + 1; end < count; ++end) {
+      for (std::size_t end = bend + 1; end < count; ++end) {
+        if (known_end && end != *known_end) continue;
         const TwoBones two{begin, bend, end, way(begin, end)};
         const double cost = cost_of(two) + cost_of_limb(two);
         if (cost >= least) continue;
@@ -85,20 +90,28 @@ double CutLimb::cost_of(const TwoBones& two) const {
   for (std::size_t i = two.begin + 1; i < two.end; ++i) {
     if (i != two.bend) cost += bends_[i - 1] ? kBent : kInner;
   }
-  return cost;
+  // A straight joint begins no limb that bends before it, or whose equal pieces do.
+  if (two.begin == 0 || bends_[two.begin - 1]) return cost;
+  const double before = way(two.begin - 1, two.begin);
+  const bool is_piece = std::abs(before - way(two.begin, two.begin + 1)) < 0.01 * before;
+  const auto bends_end = bends_.begin() + static_cast<std::ptrdiff_t>(two.begin) - 1;
+  const bool bent_before = std::find(bends_.begin(), bends_end, true) != bends_end;
+  return is_piece || bent_before ? cost + kBent : cost;
 }
 
 std::optional<TwoBones> CutLimb::as_leg() const {
-  return least([this](const TwoBones& two) {
+  return least(leg_end_, [this](const TwoBones& two) {
     return 0.5 * off_rest(rest(two), 0.25 * two.length, 0.4, 1.0) +
            at_[two.begin] / std::max(two.length, 1e-9);
   });
 }
 
 std::optional<TwoBones> CutLimb::as_arm(double leg) const {
-  if (!(leg > 0.0)) return least([](const TwoBones& two) { return -unlike(two.length, 1e-9); });
+  if (!(leg > 0.0)) {
+    return least(arm_end_, [](const TwoBones& two) { return -unlike(two.length, 1e-9); });
+  }
   // Across the shoulders counts where the body's middle is known, else the limb begins soon.
-  return least([this, leg](const TwoBones& two) {
+  return least(arm_end_, [this, leg](const TwoBones& two) {
     double cost = off(two.length, kArmOfLeg * leg, 0.05);
     cost += 0.3 * off_rest(rest(two), 0.2 * leg, 0.7, 0.15);
     if (!to_first_) return cost + 0.5 * at_[two.begin] / std::max(two.length, 1e-9);

@@ -22,8 +22,9 @@ struct TwoBones {
 // A chain of joints of which some only twist, or help the skin.
 class CutLimb {
  public:
-  // The first joints of the main chains of a pair, as far as both sides' are alike.
-  CutLimb(const Figure& figure, int one, int other);
+  // The first joints of the main chains of a pair, as far as both sides' are alike. `palm`: the
+  // joint of the first one at which an arm ends, for it spreads fingers; -1 where none does.
+  CutLimb(const Figure& figure, int one, int other, int palm);
   // A chain of one side whose last joint, with `has_end`, is where its lower bone ends.
   CutLimb(const Figure& figure, std::vector<int> chain, bool has_end);
 
@@ -39,13 +40,14 @@ class CutLimb {
   [[nodiscard]] double way(std::size_t from, std::size_t to) const { return at_[to] - at_[from]; }
   [[nodiscard]] double rest(const TwoBones& two) const { return at_.back() - at_[two.end]; }
   [[nodiscard]] double cost_of(const TwoBones& two) const;
-  [[nodiscard]] std::optional<TwoBones> least(auto cost_of_limb) const;
+  [[nodiscard]] std::optional<TwoBones> least(std::optional<std::size_t> known_end,
+                                              auto cost_of_limb) const;
 
   std::vector<int> chain_;
-  bool has_end_ = false;
-  std::optional<double> to_first_;  // from the body's middle
-  std::vector<double> at_;          // [joint of the chain, then its end] along the limb
-  std::vector<bool> bends_;         // [joint of the chain but the first and the last]
+  std::optional<std::size_t> leg_end_, arm_end_;  // where its bones end, if that is known
+  std::optional<double> to_first_;                // from the body's middle
+  std::vector<double> at_;   // [joint of the chain, then its end] along the limb
+  std::vector<bool> bends_;  // [joint of the chain but the first and the last]
 };
 
 }  // namespace posed::rig

@@ -19,7 +19,8 @@ struct LengthUnit {
   std::string_view name;
   double doubt;  // how much worse the fit of a more usual unit may be
 };
-constexpr double kCmu_m = 0.0254 / 0.45;
+constexpr double kInch_m = 0.0254;
+constexpr double kCmu_m = kInch_m / 0.45;
 constexpr double kMmd_m = 0.08;
 constexpr double kNever = 1e9;  // unless its maker's names say so: decimetres are too near
 constexpr double kHundred = 100.0;
@@ -27,11 +28,11 @@ constexpr std::array<LengthUnit, 10> kLengthUnits{
     {{1.0, "metres", 0.0},
      {0.01, "centimetres", 0.0},
      {0.001, "millimetres", 0.1},
-     {0.0254, "inches", 0.25},
+     {kInch_m, "inches", 0.5},
      {0.1, "decimetres", 0.3},
      {0.3048, "feet", 0.35},
      {kCmu_m, "inches / 0.45", 0.6},
-     {2.4384, "Poser's units of 8 feet", 0.45},
+     {2.4384, "Poser's units of 8 feet", 0.6},
      {kMmd_m, "MikuMikuDance's units of 8 cm", kNever},
      {kHundred, "metres that the file calls centimetres", kNever}}};
 
@@ -41,13 +42,12 @@ double usual_unit_m(const std::vector<RigJoint>& joints, const std::vector<Joint
     return std::ranges::any_of(names,
                                [part](const JointName& name) { return name.stem.contains(part); });
   };
-  const bool is_mmd = (any_name("upperbody") && any_name("lowerbody")) ||
-                      std::ranges::any_of(joints, [](const RigJoint& joint) {
-                        return joint.name.contains("センター");
-                      });
-  const bool is_cmu = std::ranges::any_of(
-      joints, [](const RigJoint& joint) { return lower(joint.name).contains("hipjoint"); });
-  return is_mmd ? kMmd_m : is_cmu ? kCmu_m : 0.0;
+  const auto any_joint = [&joints](std::string_view part) {
+    return std::ranges::any_of(
+        joints, [part](const RigJoint& joint) { return lower(joint.name).contains(part); });
+  };
+  const bool is_mmd = (any_name("upperbody") && any_name("lowerbody")) || any_joint("センター");
+  return is_mmd ? kMmd_m : any_joint("hipjoint") ? kCmu_m : any_joint("valvebiped") ? kInch_m : 0.0;
 }
 
 const LengthUnit& unit_for(double length, double true_m, double usual_m) {

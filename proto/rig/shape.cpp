@@ -27,53 +27,6 @@ struct Pair {
   TwoBones as_leg;
 };
 
-std::optional<Pair> mirrored(const Figure& figure, int parent, int one, int other) {
-  const int joints = figure.main_chain_length(one);
-  const int others = figure.main_chain_length(other);
-  const bool whole = std::min(joints, others) >= kLimbJoints;
-  if (std::min(joints, others) < 3 || (joints != others && !whole)) return std::nullopt;
-  const auto a = figure.segments(figure.main_chain(one));
-  const auto b = figure.segments(figure.main_chain(other));
-  double length = 0.0;
-  double gap = 0.0;
-  const std::size_t compared =
-      joints == others ? std::min<std::size_t>(a.size(), kLimbJoints) : kLimbJoints - 1;
-  for (std::size_t i = 0; i < compared; ++i) {
-    length += a[i];
-    gap += std::abs(a[i] - b[i]);
-  }
-  const double apart = std::abs(figure[one].offset.norm() - figure[other].offset.norm());
-  if (!(length > 0.0) || gap >= 0.15 * length || apart >= 0.15 * length) return std::nullopt;
-  CutLimb limb(figure, one, other);
-  const auto leg = limb.as_leg();
-  if (!leg) return std::nullopt;
-  return Pair{.length = length,
-              .parent = parent,
-              .one = one,
-              .other = other,
-              .limb = std::move(limb),
-              .as_leg = *leg};
-}
-
-std::vector<Pair> find_pairs(const Figure& figure) {
-  std::vector<Pair> pairs;
-  for (int j = 0; j < figure.size(); ++j) {
-    const auto& children = figure.children(j);
-    const int count = std::min(static_cast<int>(children.size()), kMaxSiblings);
-    for (int a = 0; a < count; ++a) {
-      for (int b = a + 1; b < count; ++b) {
-        auto pair = mirrored(figure, j, children[a], children[b]);
-        if (pair) pairs.push_back(std::move(*pair));
-      }
-    }
-  }
-  if (pairs.size() > kMaxPairs) {
-    std::ranges::stable_sort(pairs, std::greater{}, &Pair::length);
-    pairs.erase(pairs.begin() + kMaxPairs, pairs.end());
-  }
-  return pairs;
-}
-
 Vec way_to_tip(const Figure& figure, int from, const std::vector<int>& chain) {
   return figure.between(from, chain.back()).value_or(Vec::Zero()) +
          figure[chain.back()].end_site.value_or(Vec::Zero());
@@ -106,6 +59,61 @@ std::vector<std::vector<int>> spread_at(const Figure& figure, int palm) {
   return chains;
 }
 
+// The joint of a limb's chain that spreads fingers; -1 where none does.
+int palm_of(const Figure& figure, const std::vector<int>& chain) {
+  const auto palm =
+      std::ranges::find_if(chain, [&](int joint) { return !spread_at(figure, joint).empty(); });
+  return palm == chain.end() ? -1 : *palm;
+}
+
+std::optional<Pair> mirrored(const Figure& figure, int parent, int one, int other) {
+  const int joints = figure.main_chain_length(one);
+  const int others = figure.main_chain_length(other);
+  const bool whole = std::min(joints, others) >= kLimbJoints;
+  if (std::min(joints, others) < 3 || (joints != others && !whole)) return std::nullopt;
+  const auto chain = figure.main_chain(one);
+  const auto a = figure.segments(chain);
+  const auto b = figure.segments(figure.main_chain(other));
+  double length = 0.0;
+  double gap = 0.0;
+  const std::size_t compared =
+      joints == others ? std::min<std::size_t>(a.size(), kLimbJoints) : kLimbJoints - 1;
+  for (std::size_t i = 0; i < compared; ++i) {
+    length += a[i];
+    gap += std::abs(a[i] - b[i]);
+  }
+  const double apart = std::abs(figure[one].offset.norm() - figure[other].offset.norm());
+  if (!(length > 0.0) || gap >= 0.15 * length || apart >= 0.15 * length) return std::nullopt;
+  CutLimb limb(figure, one, other, palm_of(figure, chain));
+  const auto leg = limb.as_leg();
+  if (!leg) return std::nullopt;
+  return Pair{.length = length,
+              .parent = parent,
+              .one = one,
+              .other = other,
+              .limb = std::move(limb),
+              .as_leg = *leg};
+}
+
+std::vector<Pair> find_pairs(const Figure& figure) {
+  std::vector<Pair> pairs;
+  for (int j = 0; j < figure.size(); ++j) {
+    const auto& children = figure.children(j);
+    const int count = std::min(static_cast<int>(children.size()), kMaxSiblings);
+    for (int a = 0; a < count; ++a) {
+      for (int b = a + 1; b < count; ++b) {
+        auto pair = mirrored(figure, j, children[a], children[b]);
+        if (pair) pairs.push_back(std::move(*pair));
+      }
+    }
+  }
+  if (pairs.size() > kMaxPairs) {
+    std::ranges::stable_sort(pairs, std::greater{}, &Pair::length);
+    pairs.erase(pairs.begin() + kMaxPairs, pairs.end());
+  }
+  return pairs;
+}
+
 // Legs and arms hang on one trunk, none in another. The joint of the legs is above that of the
 // arms, or each is on a branch of its own. Fingers of two hands are no limbs.
 bool fit_together(const Figure& figure, const Pair& legs, const Pair& arms) {
@@ -117,8 +125,12 @@ bool fit_together(const Figure& figure, const Pair& legs, const Pair& arms) {
       figure.below(legs.parent, arms.parent) || !figure.below(arms.parent, legs.parent);
   const bool are_fingers =
       !spread_at(figure, legs.parent).empty() && !spread_at(figure, arms.parent).empty();
-  return one_trunk && !in(legs, arms.parent) && !in(arms, legs.parent) && !overlap &&
-         arms.length >= 0.4 * legs.length && arms.length <= 1.5 * legs.length && !are_fingers;
+  if (!one_trunk || in(legs, arms.parent) || in(arms, legs.parent) || overlap || are_fingers) {
+    return false;
+  }
+  const double leg = legs.as_leg.length;
+  const double arm = arms.limb.as_arm(leg)->length;
+  return arm >= 0.4 * leg && arm <= 1.5 * leg;
 }
 
 // Number of joints from where the legs' branch leaves the trunk of the arms to the legs.

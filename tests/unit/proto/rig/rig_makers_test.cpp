@@ -333,6 +333,9 @@ TEST_CASE("rig: a head that is only counted is told from the end of one by how f
                        .end_site = {}}});
     const auto found = rig::recognise(made.input);
     CHECK(found.bone[is_head ? test::kMakerJoints : head] == Bone::kHead);
+    if (!is_head) continue;
+    made.input.joints.back().end_site = 0.5 * joints[head].offset;
+    CHECK(rig::recognise(made.input).bone[test::kMakerJoints] == Bone::kHead);
   }
 }
 
@@ -1107,8 +1110,31 @@ TEST_CASE("rig: short legs below a long trunk are a child's, not a giant's in in
   };
   CHECK(unit_of(0.01, {.trunk = 0.85, .legs = 0.55, .axes = {}}) == Approx(0.01));
   CHECK(unit_of(0.01, {.height = 0.65, .legs = 0.8, .axes = {}}) == Approx(0.01));
+  CHECK(unit_of(0.01, {.height = 0.53, .axes = {}}) == Approx(0.01));
+  CHECK(unit_of(1.0, {.height = 0.48, .axes = {}}) == Approx(1.0));
   CHECK(unit_of(0.0254, {}) == Approx(0.0254));
   CHECK(unit_of(0.0254, {.height = 0.85, .axes = {}}) == Approx(0.0254));
+  CHECK(unit_of(0.0254, {.height = 1.1, .axes = {}}) == Approx(0.0254));
+}
+
+TEST_CASE("rig: Valve's names say inches, of a giant, too") {
+  const auto valve = std::ranges::find_if(test::kSchemes, [](const test::Scheme& scheme) {
+    return std::string_view(scheme.names[0]).starts_with("ValveBiped");
+  });
+  REQUIRE(valve != test::kSchemes.end());
+  const auto made =
+      test::make(*valve, ZeroPose::kT, Mat::Identity(), 0.0254, 0, 1, {.height = 1.3, .axes = {}});
+  CHECK(rig::recognise(made.input).metres_per_unit == Approx(0.0254));
+}
+
+TEST_CASE("rig: arms raised beside the head are raised, and not folded") {
+  for (const double raised_deg : {45.0, 60.0}) {
+    for (const int frames : {1, 40}) {
+      check_made(test::make(test::kSchemes[0], ZeroPose::kA, Mat::Identity(), 0.01, 0, frames,
+                            {.arms_down_deg = -raised_deg, .axes = {}}),
+                 UpAxis::kPlusY, 0.01);
+    }
+  }
 }
 
 TEST_CASE("rig: a mark beside a hand is no elbow") {
@@ -1175,10 +1201,14 @@ TEST_CASE("rig: a neck and a head that no name tells need no end of the head") {
   made.input.poses = {};
   for (std::size_t j = 0; j < joints.size(); ++j) joints[j].name = "J" + std::to_string(j);
   joints[static_cast<std::size_t>(Bone::kHead)].end_site.reset();
-  joints[static_cast<std::size_t>(Bone::kNeck)].offset.y() = 8;  // of a spine that ends high
-  const rig::Rig rig = rig::recognise(made.input);
-  CHECK(rig.bone[static_cast<std::size_t>(Bone::kNeck)] == Bone::kNeck);
-  CHECK(rig.bone[static_cast<std::size_t>(Bone::kHead)] == Bone::kHead);
+  constexpr auto kHead = static_cast<std::size_t>(Bone::kHead);
+  for (const double head : {9, 20}) {                              // of an ape
+    joints[static_cast<std::size_t>(Bone::kNeck)].offset.y() = 8;  // of a spine that ends high
+    joints[kHead].offset.y() = head;
+    const rig::Rig rig = rig::recognise(made.input);
+    CHECK(rig.bone[static_cast<std::size_t>(Bone::kNeck)] == Bone::kNeck);
+    CHECK(rig.bone[kHead] == Bone::kHead);
+  }
 }
 
 TEST_CASE("rig: the joint that carries both arms is a bone, though it is called a top") {
@@ -1226,9 +1256,10 @@ TEST_CASE("rig: axes in a name say nothing") {
 }
 
 TEST_CASE("rig: a person who lacks an arm or a leg faces, stands and measures as with it") {
-  constexpr int kLimb = 4;
   std::mt19937 random(34);
-  for (const int first : {6, 10, 14, 18}) {
+  // The first joint that is lost; of 7 and 11 a shoulder is left.
+  for (const int first : {6, 7, 10, 11, 14, 18}) {
+    const int lost = first == 7 || first == 11 ? 3 : 4;
     for (const ZeroPose zero : {ZeroPose::kT, ZeroPose::kA, ZeroPose::kArmsDown}) {
       const bool z_up = random() % 2 == 0;
       const Mat turn = Eigen::AngleAxisd(90.0 * kDegree * static_cast<double>(random() % 4),
@@ -1239,14 +1270,14 @@ TEST_CASE("rig: a person who lacks an arm or a leg faces, stands and measures as
           test::make(test::kSchemes[random() % test::kSchemes.size()], zero, axes, 0.01);
       test::Made made;
       made.input.poses.count = whole.input.poses.count;
-      const auto is_lost = [first](int b) { return b >= first && b < first + kLimb; };
+      const auto is_lost = [first, lost](int b) { return b >= first && b < first + lost; };
       for (int b = 0; b < test::kMakerJoints; ++b) {
         if (is_lost(b)) continue;
         made.bone.push_back(static_cast<Bone>(b));
         made.T.push_back(whole.T[b]);
         made.input.joints.push_back(whole.input.joints[b]);
         int& parent = made.input.joints.back().parent;
-        if (parent >= first) parent -= kLimb;
+        if (parent >= first) parent -= lost;
       }
       for (int i = 0; i < made.input.poses.count * test::kMakerJoints; ++i) {
         if (is_lost(i % test::kMakerJoints)) continue;
@@ -1361,6 +1392,28 @@ TEST_CASE("rig: joints that cut the bones of limbs without names are passed over
           CHECK(bones == test::kMakerJoints);
         }
       }
+    }
+  }
+}
+
+TEST_CASE("rig: fingers tell where an arm ends, though its bones are cut") {
+  const test::Build ape{.arms = 1.2, .axes = {}};
+  const test::Build small{.arms = 0.8, .axes = {}};
+  for (const test::Build& build : {test::Build{}, ape, small}) {
+    for (const ZeroPose zero : {ZeroPose::kT, ZeroPose::kA}) {
+      auto whole = test::make(test::kSchemes[0], zero, Mat::Identity(), 0.01, 0, 1, build);
+      whole.input.poses = {};
+      auto made = with_cut_limbs(whole, {0, 1}, 3, false);
+      const auto cut = static_cast<int>(made.input.joints.size());
+      made = with_fingers(made, test::kSchemes[0], kForeignFingers[0], 0.01, 1.0);
+      for (auto& joint : made.input.joints) joint.name = "x";
+      const rig::Rig rig = rig::recognise(made.input);
+      REQUIRE(rig.kind == rig::Kind::kPerson);
+      for (int j = 0; j < cut; ++j) {
+        INFO(j << " arms " << build.arms << " zero pose " << static_cast<int>(zero));
+        if (rig.bone[j]) CHECK(bone_name(*rig.bone[j]) == bone_name(made.bone[j]));
+      }
+      CHECK(std::ranges::count(rig.bone, Bone::kLeftHand) == 1);
     }
   }
 }
