@@ -132,6 +132,7 @@ RT_SAFE void read_member(JsonReader& json, std::string_view key, Head& head,
     head.whole = json.boolean(message.end) && head.whole;
   } else if (key == "hands") {
     head.in_range = read_hands(json, message, head.hands) && head.in_range;
+    head.whole = head.hands && head.whole;
   } else {
     json.skip();
   }

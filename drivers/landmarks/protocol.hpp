@@ -67,10 +67,10 @@ struct Message {
   bool end = false;
 };
 
-// kForeign: not of this format or version; kShort: cut, no JSON, no list of hands, or a member of
-// another kind; kOutOfRange: more than two hands, two that are surely of one side, or no time. A
-// single hand may be wrong by itself: kShort with another number of points, kOutOfRange with
-// numbers that are no hand.
+// kForeign: not of this format or version; kShort: cut, no JSON, no list of hands, or a time or end
+// of another kind; kOutOfRange: more than two hands, two that are surely of one side, or a time
+// beyond all numbers. A single hand may be wrong by itself: kShort with another number of points,
+// kOutOfRange with members that are no hand's.
 RT_SAFE [[nodiscard]] Outcome read_message(std::string_view json, Message& message) noexcept;
 
 // The message as a tracker sends it; its time is finite. Cold.

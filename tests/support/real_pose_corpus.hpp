@@ -19,8 +19,8 @@ inline const std::map<std::string, std::string> kSignOf{{"g", "A"}, {"c", "V"}, 
                                                         {"1", "G"}, {"3", "W"}, {"4", "B"}};
 
 // The 100 rows of a sign: the maker's library's angles of the sensors 0 to 21 (`SensorIndex`)
-// [rad], which is not the order of the glove's bytes; "the rows of real signs are in the order..."
-// proves it.
+// [rad], which is not the order of the glove's bytes: all rows keep the library's rule between
+// abductions (real_poses_test.cpp).
 inline constexpr std::size_t kLibrasAngles = 22;
 [[nodiscard]] std::vector<std::vector<double>> libras_rows(const std::filesystem::path& folder,
                                                            const std::string& sign);

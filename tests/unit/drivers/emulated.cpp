@@ -70,8 +70,8 @@ void pose(const DeviceFixture& fixture, std::size_t index, drivers::Emulator& em
 
 // The description that a decoder makes of a datagram; empty when it makes none.
 Bytes description_in(drivers::Decoder& decoder, const Bytes& datagram) {
-  CollectSink sink(
-      0);  // room for thousands of frames would be touched by the address sanitizer each time
+  // The address sanitizer touches all of a sink's room each time.
+  CollectSink sink(/*room=*/0);
   decoder.feed(datagram, 0, sink);
   return sink.described;
 }

@@ -71,7 +71,9 @@ export class Camera {
 
   #load() {
     const worker = new Worker(WORKER);
-    worker.onerror = () => this.#end('what finds hands cannot be loaded');
+    worker.onerror = () => {
+      if (worker === this.#worker) this.#end('what finds hands cannot be loaded');
+    };
     worker.onmessage = ({ data }) => {
       if (worker !== this.#worker) {
         data.picture?.close();

@@ -69,6 +69,8 @@ export class Takes {
       this.#run(false);
       this.name.hidden = true;
       this.fields.disabled = false; // the button says what to do
+      this.fields.title = '';
+      this.form.dataset.trouble = false;
       write(this.words, 'not recording');
       this.words.title = HOW;
       return;

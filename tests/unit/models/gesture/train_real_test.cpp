@@ -2,9 +2,15 @@
 // recorded are generated as the best composition of recorded fingers.
 #include <catch2/catch.hpp>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <iostream>
+#include <map>
 #include <numbers>
+#include <numeric>
+#include <string>
+#include <vector>
 
 #include <nlohmann/json.hpp>
 
@@ -50,7 +56,7 @@ Eigen::VectorXd held(const GestureModel& model, const Context& context) {
 
 }  // namespace
 
-TEST_CASE("Gestures that were not recorded are composed of recorded fingers", "[train][real]") {
+TEST_CASE("Real poses train a model of moderate size, each time the same", "[train][real]") {
   const auto folder = test::shared(kLibras);
   if (!folder) SKIP_WITHOUT_SHARED();
   const auto recording = test::real_pose_corpus(*folder, 7);
@@ -62,23 +68,41 @@ TEST_CASE("Gestures that were not recorded are composed of recorded fingers", "[
             << " of durations; " << report["warnings"] << "\n";
   CHECK(report["leaves"] > 80);
   CHECK(report["leaves"] < 250);
+  CHECK(train_gesture({recording}, {})->report_json == model->report_json);
+}
 
-  // g 1 c 3 4 p against the real frames of the signs, measured as in models/gesture/README.md.
-  const auto at = [&](const char* label) { return model->label_index(label); };
+// g 1 c 3 4 p against the real frames of the signs, measured as in models/gesture/README.md.
+TEST_CASE("Ten recordings compose what they lack nearly as well as can be", "[train][real]") {
+  const auto folder = test::shared(kLibras);
+  if (!folder) SKIP_WITHOUT_SHARED();
   struct Unseen {
     const char *label, *before, *after;
+    double limit;  // of the mean, in errors of the best composition
   };
-  for (const Unseen& unseen : {Unseen{"1", "g", "c"}, {"3", "c", "4"}, {"4", "3", "p"}}) {
-    const Context context{at(unseen.before), at(unseen.label), at(unseen.after)};
-    const Eigen::VectorXd real =
-        test::libras_poses(*folder, test::kSignOf.at(unseen.label)).colwise().mean();
-    const double off_deg = rms_deg(held(*model, context), real);
-    const double best_deg = test::best_composition_deg(*folder, unseen.label);
-    std::cout << unseen.label << ": " << off_deg << " deg from the real hand, the best composition "
-              << best_deg << "\n";
-    CHECK(off_deg <= 1.7 * best_deg);  // 3 has its little finger from g, and c's is nearer
+  constexpr std::uint32_t kSeeds = 10;
+  std::map<std::string, std::vector<double>> ratios;
+  // 3 has its little finger from g, and c's is nearer.
+  const std::array unseen{Unseen{"1", "g", "c", 1.35}, Unseen{"3", "c", "4", 1.75},
+                          Unseen{"4", "3", "p", 1.25}};
+  for (std::uint32_t seed = 1; seed <= kSeeds; ++seed) {
+    const auto model = train_gesture({test::real_pose_corpus(*folder, seed)}, {});
+    REQUIRE(model.has_value());
+    const auto at = [&](const char* label) { return model->label_index(label); };
+    for (const Unseen& one : unseen) {
+      const Context context{at(one.before), at(one.label), at(one.after)};
+      const Eigen::VectorXd real =
+          test::libras_poses(*folder, test::kSignOf.at(one.label)).colwise().mean();
+      ratios[one.label].push_back(rms_deg(held(*model, context), real) /
+                                  test::best_composition_deg(*folder, one.label));
+    }
   }
-  CHECK(train_gesture({recording}, {})->report_json == model->report_json);
+  for (const Unseen& one : unseen) {
+    const auto& all = ratios[one.label];
+    const double mean = std::accumulate(all.begin(), all.end(), 0.0) / kSeeds;
+    std::cout << one.label << ": " << mean << " (worst " << std::ranges::max(all)
+              << ") times the error of the best composition of recorded fingers\n";
+    CHECK(mean <= one.limit);
+  }
 }
 
 TEST_CASE("Embedded rounds correct borders that are off", "[train][real]") {

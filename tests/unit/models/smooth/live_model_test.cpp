@@ -118,7 +118,8 @@ TEST_CASE("a hand that makes none of the gestures is told so where the model doe
     with.add(followed(measured, 30.0, options, &model_with_none()), truth, 1);
     CHECK(with.accuracy() == without.accuracy());
   }
-  // Real poses of the three signs with twice the spread that was taught, then of all others.
+  // Real poses of the three signs with twice the spread that was taught (the first rows are on
+  // their way from another sign), then of all others.
   for (const char* sign : {"A", "V", "4"}) {
     const int percent = none_percent(sign);
     std::cout << "sign " << sign << ", learnt: " << percent << " % of the frames none\n";
