@@ -150,22 +150,54 @@ bool PoseSolver::step(const HandTarget& target) noexcept {
     now = find_step(turn, wanted);
   }
   lately_ = wanted.cwiseAbs().cwiseMax(kForgets * lately_);
-  const double most_rad = wanted.cwiseAbs().maxCoeff();
-  if (most_rad <= kTiny_rad) return false;
-  wanted *= std::min(1.0, kMaxStep_rad / most_rad);
-  for (int shorter = 0; shorter <= kBacktracks; ++shorter, wanted *= kShorter) {
+  if (wanted.cwiseAbs().maxCoeff() <= kTiny_rad) return false;
+  if (!advance(target, before, now, wanted)) {
+    look_ahead(target, wanted);
+    (void)robot::solve(program_, wanted);
+    if (!advance(target, before, now, wanted)) return false;
+  }
+  return wanted.cwiseAbs().maxCoeff() > kTiny_rad;
+}
+
+// Goes by `wanted` or the first shorter step that is a gain; if none is, `wanted` is the shortest.
+bool PoseSolver::advance(const HandTarget& target, double before, const Nearness& now,
+                         Drive& wanted) noexcept {
+  wanted *= std::min(1.0, kMaxStep_rad / std::max(wanted.cwiseAbs().maxCoeff(), kMaxStep_rad));
+  // Where the command would not keep its margin it would stand: the margin is part of the cost.
+  const double most = before + kMissing * now.missing_m;
+  for (int shorter = 0;; ++shorter, wanted *= kShorter) {
     const Drive there = pose_ + wanted;
     const double after = cost(target, there, false);
-    // Where the command would not keep its margin it would stand: the margin is part of the cost.
-    const double most = before + kMissing * now.missing_m;
-    if (!(after <= most)) continue;
-    const Nearness then = nearness(find_gaps(robot_, placed_, {.most_m = margin_m_}, false, gaps_));
-    if (then.overlap_m > std::max(now.overlap_m, 1e-5)) continue;
-    if (after + kMissing * then.missing_m > most) continue;
-    pose_ = there;
-    return wanted.cwiseAbs().maxCoeff() > kTiny_rad;
+    if (after <= most) {
+      const Nearness then =
+          nearness(find_gaps(robot_, placed_, {.most_m = margin_m_}, false, gaps_));
+      if (then.overlap_m <= std::max(now.overlap_m, 1e-5) &&
+          after + kMissing * then.missing_m <= most) {
+        pose_ = there;
+        return true;
+      }
+    }
+    if (shorter == kBacktracks) return false;
   }
-  return false;
+}
+
+// Links have edges: on the way they touch elsewhere than where they are nearest now, and the gap of
+// thumb and finger has another slope behind an edge. So the step's program is the mean of that here
+// and that at `wanted`, with rows for the pairs that are too near there: they come no nearer than
+// now.
+void PoseSolver::look_ahead(const HandTarget& target, const Drive& wanted) noexcept {
+  const Metric H = program_.H;
+  const Drive g = program_.g;
+  cost(target, pose_ + wanted, true);
+  program_.g = 0.5 * (g + program_.g - program_.H * wanted);
+  program_.H = 0.5 * (H + program_.H);
+  const auto gaps = find_gaps(robot_, placed_, {.most_m = margin_m_}, true, gaps_);
+  std::size_t count = program_.rows.size();
+  for (const Gap& gap : gaps) {
+    const double here_m = gap.gap_m - gap.slope.dot(wanted);
+    rows_[count++] = {.slope = gap.slope, .least = std::min(margin_m_ - here_m, 0.0)};
+  }
+  program_.rows = {rows_.data(), count};
 }
 
 const Drive& PoseSolver::solve(const HandTarget& target, int rounds) noexcept {

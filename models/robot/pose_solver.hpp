@@ -31,13 +31,16 @@ class PoseSolver {
   };
   RT_SAFE Nearness nearness(std::span<const Gap> gaps) const noexcept;
   RT_SAFE Nearness find_step(const Drive& turn, Drive& wanted) noexcept;
+  RT_SAFE bool advance(const HandTarget& target, double before, const Nearness& now,
+                       Drive& wanted) noexcept;
+  RT_SAFE void look_ahead(const HandTarget& target, const Drive& wanted) noexcept;
   RT_SAFE bool step(const HandTarget& target) noexcept;
 
   const RobotHand& robot_;
   double margin_m_;
   Placed placed_;
   Gaps gaps_{};
-  std::array<StepRow, kMaxGaps> rows_{};
+  std::array<StepRow, 2 * kMaxGaps> rows_{};
   StepProgram program_;
   Drive pose_, middle_;
   Drive lately_ = Drive::Zero();  // what each joint has turned in a step

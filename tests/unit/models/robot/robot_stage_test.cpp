@@ -9,6 +9,7 @@
 #include "models/robot/hand_target.hpp"
 #include "models/robot/pose_solver.hpp"
 #include "tests/support/allocations.hpp"
+#include "tests/support/hand_signs.hpp"
 #include "tests/unit/models/robot/robot_rig.hpp"
 
 namespace posed::robot {
@@ -224,6 +225,50 @@ TEST_CASE("a solver's pose keeps the margin that the command keeps") {
     nearer += least_m < 0.8e-3 ? 1 : 0;
   }
   CHECK(nearer == 0);
+}
+
+// LEAP's links have edges: where rows kept only their nearest points apart, a thumb stood still for
+// twelve seconds of these signs.
+TEST_CASE("a robot's hand follows from sign to sign") {
+  const auto robots = test::shared("data/robots/leap_hand");
+  const auto signs = test::shared("data/gloves/libras_cyberglove");
+  if (!robots || !signs) SKIP_WITHOUT_SHARED();
+  const std::string path = (*robots / "leap_hand_right.urdf").string();
+  auto urdf = parse_urdf(load_urdf(path).value(), path).value();
+  const RobotHand robot = robot_hand(std::move(urdf), {}, path).value();
+  HandTargets targets(robot, hand::hand_geometry(default_hand_shape()));
+  PoseSolver solver(robot, 1e-3);
+  hand::ConstraintSolver constrain;
+  HandAngles variance;
+  variance.fill(1.0);
+  HandAngles from{};
+  int stood = 0, moved = 0;
+  for (const test::ThumbSign& sign : test::kThumbSigns) {
+    for (const HandAngles& to : test::sign_poses(*signs, sign.name)) {
+      const Drive before = solver.pose();
+      constexpr int kMove = 60, kHold = 60;
+      for (int t = 1; t <= kMove + kHold; ++t) {
+        const double share = std::min(1.0, static_cast<double>(t) / kMove);
+        HandAngles angles;
+        for (std::size_t c = 0; c < angles.size(); ++c) {
+          angles[c] = from[c] + share * (to[c] - from[c]);
+        }
+        constrain.step(angles, variance);
+        HandTarget target;
+        targets.find(angles, target);
+        solver.solve(target, 2);
+      }
+      double turned = 0.0;
+      for (std::size_t c = 0; c < to.size(); ++c)
+        turned = std::max(turned, std::abs(to[c] - from[c]));
+      from = to;
+      if (turned < 0.3) continue;
+      ++moved;
+      stood += (solver.pose() - before).cwiseAbs().maxCoeff() < 0.02 ? 1 : 0;
+    }
+  }
+  CHECK(moved > 30);
+  CHECK(stood == 0);
 }
 
 TEST_CASE("a command that links stop is counted once, names them, and lets go of the pose") {
