@@ -26,14 +26,17 @@ double unlike(double one, double other) {
   return std::abs(std::log(std::max(one, 1e-9) / std::max(other, 1e-9)));
 }
 
-CutLimb::CutLimb(const Figure& figure, int one, int other, int palm)
-    : chain_(figure.main_chain(one)),
-      to_first_((figure[one].offset - figure[other].offset).norm() / 2) {
-  auto segments = figure.segments(chain_);
-  const auto others = figure.segments(figure.main_chain(other));
-  segments.resize(std::min({segments.size(), others.size(), kMaxCutJoints}));
-  for (std::size_t i = 0; i < segments.size(); ++i) segments[i] = std::min(segments[i], others[i]);
-  chain_.resize(segments.size());
+CutLimb::CutLimb(const Figure& figure, const std::array<std::vector<int>, 2>& pair, int palm)
+    : chain_(pair[0]),
+      to_first_((figure[pair[0][0]].offset - figure[pair[1][0]].offset).norm() / 2) {
+  chain_.resize(std::min(chain_.size(), kMaxCutJoints));
+  std::vector<double> segments;
+  for (std::size_t i = 1; i < chain_.size(); ++i) {
+    segments.push_back(
+        std::min(figure[pair[0][i]].offset.norm(), figure[pair[1][i]].offset.norm()));
+  }
+  segments.push_back(
+      std::min(figure.end_length(pair[0].back()), figure.end_length(pair[1].back())));
   const auto hand = std::ranges::find(chain_, palm);
   if (hand - chain_.begin() > 1 && hand != chain_.end()) arm_end_ = hand - chain_.begin();
   measure(figure, segments);

@@ -1,6 +1,7 @@
 // Where a limb's two bones begin, bend and end, by the lengths along its joints. Cold.
 #pragma once
 
+#include <array>
 #include <optional>
 #include <vector>
 
@@ -22,9 +23,9 @@ struct TwoBones {
 // A chain of joints of which some only twist, or help the skin.
 class CutLimb {
  public:
-  // The first joints of the main chains of a pair, as far as both sides' are alike. `palm`: the
-  // joint of the first one at which an arm ends, for it spreads fingers; -1 where none does.
-  CutLimb(const Figure& figure, int one, int other, int palm);
+  // Both chains of a pair, of as many joints. `palm`: the joint of the first one at which an arm
+  // ends, for it spreads fingers; -1 where none does.
+  CutLimb(const Figure& figure, const std::array<std::vector<int>, 2>& pair, int palm);
   // A chain of one side whose last joint, with `has_end`, is where its lower bone ends.
   CutLimb(const Figure& figure, std::vector<int> chain, bool has_end);
 

@@ -11,20 +11,20 @@ Figure::Figure(std::vector<RigJoint> joints)
       begin_(joints_.size(), 0),
       end_(joints_.size(), 0),
       main_child_(joints_.size(), -1),
-      chain_length_(joints_.size(), 1) {
+      chain_length_(joints_.size(), 1),
+      reach_(joints_.size(), 0.0) {
   std::vector<int> count(joints_.size(), 1);  // joints at or below
-  std::vector<double> reach(joints_.size(), 0.0);
   for (int j = size() - 1; j >= 0; --j) {
     const int parent = joints_[j].parent;
-    reach[j] = std::max(reach[j], end_length(j));
+    reach_[j] = std::max(reach_[j], end_length(j));
     if (main_child_[j] >= 0) chain_length_[j] = chain_length_[main_child_[j]] + 1;
     if (parent < 0) continue;
     count[parent] += count[j];
-    const double way = joints_[j].offset.norm() + reach[j];
+    const double way = joints_[j].offset.norm() + reach_[j];
     // Of equal ways the first child's counts; children come last first here.
     const int best = main_child_[parent];
-    if (best < 0 || way >= joints_[best].offset.norm() + reach[best]) main_child_[parent] = j;
-    reach[parent] = std::max(reach[parent], way);
+    if (best < 0 || way >= joints_[best].offset.norm() + reach_[best]) main_child_[parent] = j;
+    reach_[parent] = std::max(reach_[parent], way);
   }
   std::vector<int> next(joints_.size(), 0);  // where the next child begins
   for (int j = 0; j < size(); ++j) {

@@ -57,7 +57,10 @@ class Figure {
 
   // The joint, then always the child with the longest way to a tip below it.
   [[nodiscard]] std::vector<int> main_chain(int joint) const;
+  [[nodiscard]] int main_child(int joint) const { return main_child_[joint]; }
   [[nodiscard]] int main_chain_length(int joint) const { return chain_length_[joint]; }
+  // The longest way to a tip below the joint.
+  [[nodiscard]] double reach(int joint) const { return reach_[joint]; }
   // Lengths of the segments that begin at the joints of a main chain; the last is its end site's.
   [[nodiscard]] std::vector<double> segments(const std::vector<int>& chain) const;
 
@@ -65,6 +68,7 @@ class Figure {
   std::vector<RigJoint> joints_;
   std::vector<std::vector<int>> children_;
   std::vector<int> depth_, begin_, end_, main_child_, chain_length_;
+  std::vector<double> reach_;
 };
 
 }  // namespace posed::rig

@@ -1,4 +1,5 @@
 #include <cmath>
+#include <span>
 
 #include "proto/rig/bones.hpp"
 #include "proto/rig/cut.hpp"
@@ -7,8 +8,8 @@ namespace posed::rig {
 namespace {
 
 constexpr std::size_t kMaxPairs = 400;  // the longest; a person has a dozen
-constexpr int kMaxSiblings = 64;
-constexpr int kLimbJoints = 4;
+constexpr std::size_t kMaxSiblings = 64;
+constexpr std::size_t kLimbJoints = 4;
 
 constexpr std::array kLeg{Bone::kLeftUpperLeg, Bone::kLeftLowerLeg, Bone::kLeftFoot,
                           Bone::kLeftToes};
@@ -17,12 +18,12 @@ constexpr std::array kArm{Bone::kLeftShoulder, Bone::kLeftUpperArm, Bone::kLeftL
 
 constexpr double kTrunkOfLeg = 0.45;  // from where the legs begin to where the arms do
 
-// Two chains that begin at one joint and are as long as each other, as far as a limb goes: a hand
-// may hold a prop.
+// Two chains that begin at one joint and are as long as each other, as far as a limb goes.
 struct Pair {
   double length = 0.0;
   int parent = 0;
   int one = 0, other = 0;  // where the chains begin
+  std::array<std::vector<int>, 2> chain;
   CutLimb limb;
   TwoBones as_leg;
 };
@@ -66,31 +67,67 @@ int palm_of(const Figure& figure, const std::vector<int>& chain) {
   return palm == chain.end() ? -1 : *palm;
 }
 
+// The joints of two limbs that have one another's length, side by side: an arm may hold a shield,
+// or a hand a weapon.
+std::array<std::vector<int>, 2> side_by_side(const Figure& figure, int one, int other) {
+  constexpr double kDiffer = 0.15;
+  constexpr std::size_t kMaxJoints = 16;
+  std::array<std::vector<int>, 2> chains;
+  while (one >= 0 && other >= 0 && chains[0].size() < kMaxJoints) {
+    chains[0].push_back(one);
+    chains[1].push_back(other);
+    const std::span<const int> mine = figure.children(one);
+    const std::span<const int> theirs = figure.children(other);
+    const bool is_whole = chains[0].size() >= kLimbJoints;
+    one = is_whole ? -1 : figure.main_child(one);
+    other = is_whole ? -1 : figure.main_child(other);
+    double farthest = -1.0;
+    for (const int a : mine.first(std::min(mine.size(), kMaxSiblings))) {
+      for (const int b : theirs.first(std::min(theirs.size(), kMaxSiblings))) {
+        const double length = figure[a].offset.norm();
+        const double their = figure[b].offset.norm();
+        const double way = std::min(length + figure.reach(a), their + figure.reach(b));
+        if (std::abs(length - their) > kDiffer * std::max(length, their) || way <= farthest) {
+          continue;
+        }
+        farthest = way;
+        one = a;
+        other = b;
+      }
+    }
+  }
+  return chains;
+}
+
 std::optional<Pair> mirrored(const Figure& figure, int parent, int one, int other) {
   const int joints = figure.main_chain_length(one);
   const int others = figure.main_chain_length(other);
-  const bool whole = std::min(joints, others) >= kLimbJoints;
-  if (std::min(joints, others) < 3 || (joints != others && !whole)) return std::nullopt;
-  const auto chain = figure.main_chain(one);
-  const auto a = figure.segments(chain);
-  const auto b = figure.segments(figure.main_chain(other));
+  if (std::min(joints, others) < 3) return std::nullopt;
+  auto chains = side_by_side(figure, one, other);
+  const std::size_t count = chains[0].size();
+  if (count < 3 || (count < kLimbJoints && joints != others)) return std::nullopt;
   double length = 0.0;
   double gap = 0.0;
-  const std::size_t compared =
-      joints == others ? std::min<std::size_t>(a.size(), kLimbJoints) : kLimbJoints - 1;
-  for (std::size_t i = 0; i < compared; ++i) {
-    length += a[i];
-    gap += std::abs(a[i] - b[i]);
+  const auto compare = [&](double a, double b) {
+    length += a;
+    gap += std::abs(a - b);
+  };
+  for (std::size_t i = 1; i < std::min(count, kLimbJoints + 1); ++i) {
+    compare(figure[chains[0][i]].offset.norm(), figure[chains[1][i]].offset.norm());
+  }
+  if (count <= kLimbJoints && joints == others) {
+    compare(figure.end_length(chains[0].back()), figure.end_length(chains[1].back()));
   }
   const double apart = std::abs(figure[one].offset.norm() - figure[other].offset.norm());
   if (!(length > 0.0) || gap >= 0.15 * length || apart >= 0.15 * length) return std::nullopt;
-  CutLimb limb(figure, one, other, palm_of(figure, chain));
+  CutLimb limb(figure, chains, palm_of(figure, chains[0]));
   const auto leg = limb.as_leg();
   if (!leg) return std::nullopt;
   return Pair{.length = length,
               .parent = parent,
               .one = one,
               .other = other,
+              .chain = std::move(chains),
               .limb = std::move(limb),
               .as_leg = *leg};
 }
@@ -99,9 +136,9 @@ std::vector<Pair> find_pairs(const Figure& figure) {
   std::vector<Pair> pairs;
   for (int j = 0; j < figure.size(); ++j) {
     const auto& children = figure.children(j);
-    const int count = std::min(static_cast<int>(children.size()), kMaxSiblings);
-    for (int a = 0; a < count; ++a) {
-      for (int b = a + 1; b < count; ++b) {
+    const std::size_t count = std::min(children.size(), kMaxSiblings);
+    for (std::size_t a = 0; a < count; ++a) {
+      for (std::size_t b = a + 1; b < count; ++b) {
         auto pair = mirrored(figure, j, children[a], children[b]);
         if (pair) pairs.push_back(std::move(*pair));
       }
@@ -154,13 +191,12 @@ double person_score(const Figure& figure, const Pair& legs, const Pair& arms) {
   return leg * std::exp(-(arm + body + off));
 }
 
-void set_limb(const Figure& figure, const Pair& pair, bool arm, const TwoBones& two,
-              BoneJoints& bones) {
+void set_limb(const Pair& pair, bool arm, const TwoBones& two, BoneJoints& bones) {
   const std::array<std::size_t, 4> at =  // wraps where an arm has no clavicle
       arm ? std::array{two.begin - 1, two.begin, two.bend, two.end}
           : std::array{two.begin, two.bend, two.end, two.end + 1};
   for (const Side side : kSides) {
-    const auto chain = figure.main_chain(side == Side::kLeft ? pair.one : pair.other);
+    const auto& chain = pair.chain[side == Side::kLeft ? 0 : 1];
     for (std::size_t k = 0; k < at.size(); ++k) {
       if (at[k] < chain.size()) bones.set(on(side, arm ? kArm[k] : kLeg[k]), chain[at[k]]);
     }
@@ -286,8 +322,8 @@ std::optional<BoneJoints> limbs_by_shape(const Figure& figure, const std::vector
   }
   if (legs == nullptr) return std::nullopt;
   BoneJoints bones;
-  set_limb(figure, *legs, false, legs->as_leg, bones);
-  set_limb(figure, *arms, true, *arms->limb.as_arm(legs->as_leg.length), bones);
+  set_limb(*legs, false, legs->as_leg, bones);
+  set_limb(*arms, true, *arms->limb.as_arm(legs->as_leg.length), bones);
   if (!bones.has_limbs()) return std::nullopt;
   settle_sides(figure, names, bones, sides_by);
   return bones;

@@ -1305,7 +1305,9 @@ TEST_CASE("rig: without names wings, capes, long hair and weapons are no limbs")
       {{Bone::kUpperChest, {{6, 5, -10}, {35, 35, -10}, {60, 10, -5}, {58, -30, 0}}}},
       {{Bone::kHead, {{10, 12, -5}, {10, -20, -5}, {5, -35, -2}, {2, -35, -2}}}},
       {{Bone::kLeftHand, {{5, 0, 0}, {0, 0, 50}, {0, 0, 50}}},
-       {Bone::kUpperChest, {{0, 5, -10}, {0, -35, -5}, {0, -35, -5}, {0, -35, -5}}}}};
+       {Bone::kUpperChest, {{0, 5, -10}, {0, -35, -5}, {0, -35, -5}, {0, -35, -5}}}},
+      {{Bone::kLeftLowerArm, {{0, 5, 8}, {0, 45, 0}}},
+       {Bone::kRightHand, {{0, 0, 5}, {0, 0, 90}}}}};
   for (const auto& extra : extras) {
     auto made = test::make(test::kSchemes[0], ZeroPose::kT, Mat::Identity(), 0.01);
     made.input.poses = {};
