@@ -79,17 +79,22 @@ void keep_if_any(std::vector<int>& joints, const auto& is_wanted) {
   if (!kept.empty()) joints = std::move(kept);
 }
 
-// Whether hands end without tips: then a head has none either.
+// Whether hands, or most of their fingers, end without tips: then a head has none either. Most,
+// because a thumb's first bone is as short as one in the palm.
 bool hands_lack_tips(const Figure& figure, const BoneJoints& bones) {
-  return std::ranges::all_of(kSides, [&](Side side) {
+  int lack = 0;
+  for (const Side side : kSides) {
     const int hand = bones[on(side, Bone::kLeftHand)];
-    return hand >= 0 && std::ranges::all_of(figure.children(hand), [&](int child) {
-             const auto finger = figure.main_chain(child);
-             const bool in_palm = finger.size() > 1 &&
-                                  figure[finger[0]].offset.norm() < figure[finger[1]].offset.norm();
-             return std::ssize(finger) == kFingerJoints + (in_palm ? 1 : 0);
-           });
-  });
+    if (hand < 0) return false;
+    if (figure.children(hand).empty()) ++lack;
+    for (const int child : figure.children(hand)) {
+      const auto finger = figure.main_chain(child);
+      const bool in_palm =
+          finger.size() > 1 && figure[finger[0]].offset.norm() < figure[finger[1]].offset.norm();
+      lack += std::ssize(finger) == kFingerJoints + (in_palm ? 1 : 0) ? 1 : -1;
+    }
+  }
+  return lack > 0;
 }
 
 // Where the chain of neck and head begins, if neither is named: above the arms, and with no arm

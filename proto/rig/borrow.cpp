@@ -55,18 +55,23 @@ struct Borrowed {
 void name_stump(const std::vector<JointName>& names, const BorrowedLimb& limb, Side side,
                 BoneJoints& bones) {
   const Side other = side == Side::kLeft ? Side::kRight : Side::kLeft;
-  const BoneJoints before = bones;
+  std::array<int, kBorrowedBones> named;
+  named.fill(-1);
   for (int k = 0; k < kBorrowedBones; ++k) {
-    const int mine = before[on(side, bone_after(limb.first, k))];
-    for (int of = 0; mine >= 0 && of < kBorrowedBones; ++of) {
-      const int theirs = before[on(other, bone_after(limb.first, of))];
+    const int mine = bones[on(side, bone_after(limb.first, k))];
+    if (mine < 0) continue;
+    int at = k;
+    for (int of = 0; of < kBorrowedBones; ++of) {
+      const int theirs = bones[on(other, bone_after(limb.first, of))];
       const bool is_same = theirs >= 0 && names[mine].stem == names[theirs].stem &&
                            names[mine].digits == names[theirs].digits;
-      if (!is_same || of == k) continue;
-      bones.set(on(side, bone_after(limb.first, k)), -1);
-      bones.set(on(side, bone_after(limb.first, of)), mine);
+      if (is_same) at = of;
+      if (is_same) break;
     }
+    if (named[at] >= 0) return;  // two of one name say nothing
+    named[at] = mine;
   }
+  for (int k = 0; k < kBorrowedBones; ++k) bones.set(on(side, bone_after(limb.first, k)), named[k]);
 }
 
 // The limb of `side` as the mirror image of the other one's, below what is there of it.

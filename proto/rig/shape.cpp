@@ -151,9 +151,10 @@ std::vector<Pair> find_pairs(const Figure& figure) {
   return pairs;
 }
 
-// Legs and arms hang on one trunk, none in another. The joint of the legs is above that of the
-// arms, or each is on a branch of its own. Fingers of two hands are no limbs.
-bool fit_together(const Figure& figure, const Pair& legs, const Pair& arms) {
+// Where arms bend, if legs and arms are one body's: they hang on one trunk, none in another. The
+// joint of the legs is above that of the arms, or each is on a branch of its own. Fingers of two
+// hands are no limbs.
+std::optional<TwoBones> fit_together(const Figure& figure, const Pair& legs, const Pair& arms) {
   const auto in = [&figure](const Pair& pair, int joint) {
     return figure.below(pair.one, joint) || figure.below(pair.other, joint);
   };
@@ -163,11 +164,12 @@ bool fit_together(const Figure& figure, const Pair& legs, const Pair& arms) {
   const bool are_fingers =
       !spread_at(figure, legs.parent).empty() && !spread_at(figure, arms.parent).empty();
   if (!one_trunk || in(legs, arms.parent) || in(arms, legs.parent) || overlap || are_fingers) {
-    return false;
+    return std::nullopt;
   }
   const double leg = legs.as_leg.length;
-  const double arm = arms.limb.as_arm(leg)->length;
-  return arm >= 0.4 * leg && arm <= 1.5 * leg;
+  const auto arm = arms.limb.as_arm(leg);
+  if (!arm || arm->length < 0.4 * leg || arm->length > 1.5 * leg) return std::nullopt;
+  return arm;
 }
 
 // Number of joints from where the legs' branch leaves the trunk of the arms to the legs.
@@ -177,15 +179,15 @@ int branched_off(const Figure& figure, const Pair& legs, const Pair& arms) {
 
 // How well two pairs of limbs are a person's: the longer legs, the better, but wings, hair, capes
 // and skirts are of other sizes than arms, or begin elsewhere.
-double person_score(const Figure& figure, const Pair& legs, const Pair& arms) {
+double person_score(const Figure& figure, const Pair& legs, const Pair& arms,
+                    const TwoBones& as_arm) {
   constexpr double kArmsDiffer = 0.15;
   constexpr double kTrunksDiffer = 0.7;
   const int common = figure.common({legs.parent, arms.parent});
   const Vec trunk = figure.between(common, arms.parent).value_or(Vec::Zero()) -
                     figure.between(common, legs.parent).value_or(Vec::Zero());
   const double leg = legs.as_leg.length;
-  const double as_arm = arms.limb.as_arm(leg)->length;
-  const double arm = std::max(0.0, unlike(as_arm, kArmOfLeg * leg) - kArmsDiffer);
+  const double arm = std::max(0.0, unlike(as_arm.length, kArmOfLeg * leg) - kArmsDiffer);
   const double body = std::clamp(unlike(trunk.norm(), kTrunkOfLeg * leg) - kTrunksDiffer, 0.0, 1.0);
   const double off = 0.3 * branched_off(figure, legs, arms) + 1e-3 * figure.depth(legs.parent);
   return leg * std::exp(-(arm + body + off));
@@ -305,16 +307,19 @@ std::optional<BoneJoints> limbs_by_shape(const Figure& figure, const std::vector
   double best = 0.0;
   const Pair* legs = nullptr;
   const Pair* arms = nullptr;
+  TwoBones as_arm;
   const auto pairs_at = [&pairs](int joint) {
     return std::ranges::count(pairs, joint, &Pair::parent);
   };
   for (const Pair& leg : pairs) {
     for (const Pair& arm : pairs) {
-      if (&leg == &arm || !fit_together(figure, leg, arm)) continue;
       // Many equal limbs at one joint are a spider's.
-      if (leg.parent == arm.parent && pairs_at(leg.parent) > 4) continue;
-      const double score = person_score(figure, leg, arm);
+      if (&leg == &arm || (leg.parent == arm.parent && pairs_at(leg.parent) > 4)) continue;
+      const auto cut = fit_together(figure, leg, arm);
+      if (!cut) continue;
+      const double score = person_score(figure, leg, arm, *cut);
       if (score <= best * (1 + 1e-9)) continue;
+      as_arm = *cut;
       best = score;
       legs = &leg;
       arms = &arm;
@@ -323,7 +328,7 @@ std::optional<BoneJoints> limbs_by_shape(const Figure& figure, const std::vector
   if (legs == nullptr) return std::nullopt;
   BoneJoints bones;
   set_limb(*legs, false, legs->as_leg, bones);
-  set_limb(*arms, true, *arms->limb.as_arm(legs->as_leg.length), bones);
+  set_limb(*arms, true, as_arm, bones);
   if (!bones.has_limbs()) return std::nullopt;
   settle_sides(figure, names, bones, sides_by);
   return bones;
