@@ -5,6 +5,7 @@
 #include <cerrno>
 #include <csignal>
 #include <utility>
+#include <vector>
 
 #include <malloc.h>
 #include <poll.h>
@@ -30,9 +31,10 @@ constexpr int kEvents = ZMQ_EVENT_CONNECTED | ZMQ_EVENT_HANDSHAKE_SUCCEEDED |
 // many short ones bring no more than a long one while nothing is received.
 constexpr std::uint64_t kUnseen = 384 * 1024;
 
-// Bytes that wait in all links. When they are too many, each link with more than its share is cut.
-std::atomic<std::uint64_t> unreceived_of_all{0};
-constexpr std::uint64_t kShare = kMaxUnreceived / 4;
+// The bytes that wait in each link. When they are too many in all, the link with the most is cut:
+// whatever the number of links is, those with less keep theirs.
+std::mutex unreceived_mutex;
+std::vector<const std::uint64_t*> unreceived_of_links;
 
 constexpr int kTick_ms = 10;  // a flood of empty parts fills about 0.7 GB a second
 
@@ -59,19 +61,29 @@ Result<std::unique_ptr<LinkMonitor>> LinkMonitor::open(void* context, void* sock
 }
 
 LinkMonitor::LinkMonitor(void* socket, SocketEvents events, bool with_key)
-    : socket_(socket), with_key_(with_key), events_(std::move(events)) {}
+    : socket_(socket), with_key_(with_key), events_(std::move(events)) {
+  const std::scoped_lock lock(unreceived_mutex);
+  unreceived_of_links.push_back(&unreceived_);
+}
 
 LinkMonitor::~LinkMonitor() {
   stop_.store(true);
   wake_.signal();
   if (thread_.joinable()) thread_.join();
-  static_cast<void>(note_unreceived(0));
+  const std::scoped_lock lock(unreceived_mutex);
+  std::erase(unreceived_of_links, &unreceived_);
 }
 
 bool LinkMonitor::note_unreceived(std::uint64_t bytes) noexcept {
-  const std::uint64_t before = std::exchange(unreceived_, bytes);
-  const std::uint64_t all = unreceived_of_all.fetch_add(bytes - before) + bytes - before;
-  return bytes <= (all <= kMaxUnreceived ? kMaxUnreceived : kShare);
+  const std::scoped_lock lock(unreceived_mutex);
+  unreceived_ = bytes;
+  std::uint64_t all = 0;
+  std::uint64_t most = 0;
+  for (const std::uint64_t* link : unreceived_of_links) {
+    all += *link;
+    most = std::max(most, *link);
+  }
+  return all <= kMaxUnreceived || bytes < most;
 }
 
 void LinkMonitor::watch() {

@@ -4,11 +4,11 @@
 //
 // libzmq counts neither the parts of a message nor its bytes against the high-water mark, and an
 // empty part (two bytes on the wire) takes 64 in memory. So a thread asks the kernel every 10 ms
-// how many bytes have arrived, subtracts those that were received as messages, and shuts the
-// connection down when too many are left; libzmq frees them and connects again. That bounds the
-// memory whoever the peer is: whoever takes a daemon's port while it is away can be anybody. The
-// kernel has no such count for ipc:// connections; they are protected by the file's permissions.
-// One thread uses a LinkMonitor. Cold.
+// how many bytes have arrived, subtracts those that were received as messages, and when too many
+// are left in all links of the process together, shuts down the connection with the most; libzmq
+// frees them and connects again. That bounds the memory whoever the peers are: whoever takes a
+// daemon's port while it is away can be anybody. The kernel has no such count for ipc://
+// connections; they are protected by the file's permissions. One thread uses a LinkMonitor. Cold.
 #pragma once
 
 #include <atomic>
@@ -80,7 +80,7 @@ class LinkMonitor {
   [[nodiscard]] Refusal handle(std::uint16_t event, int value);
   [[nodiscard]] bool is_connected() const noexcept { return fd_ >= 0; }
   void inspect();
-  // Tells all links how much waits in this one; returns whether that is allowed.
+  // Tells all links how much waits in this one; returns whether it may stay.
   [[nodiscard]] bool note_unreceived(std::uint64_t bytes) noexcept;
 
   void* socket_;
@@ -96,7 +96,7 @@ class LinkMonitor {
   int fd_ = -1;                       // the connection's descriptor; -1: none
   std::uint64_t cookie_ = 0;          // and its id
   bool is_cut_ = false;
-  std::uint64_t unreceived_ = 0;  // bytes, as of the last look
+  std::uint64_t unreceived_ = 0;  // bytes, as of the last look; all links read it
   // Bytes that have arrived: in earlier connections, in this one as of the last look, and in all
   // when nothing waited to be received; and how many belong to parts that were received.
   std::uint64_t before_ = 0, arrived_ = 0, when_empty_ = 0, accounted_ = 0;

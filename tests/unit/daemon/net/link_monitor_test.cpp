@@ -1,11 +1,13 @@
 // Connections that were made to a daemon, when somebody else has its port: their memory is bounded.
 #include <catch2/catch.hpp>
 
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <memory>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "drivers/transport/subscription.hpp"
 #include "drivers/transport/transport_factory.hpp"
@@ -40,6 +42,22 @@ struct Linked {
       std::this_thread::sleep_for(1ms);
     }
     return std::string(part.text());
+  }
+  // Lets the peer send parts of a message that never ends.
+  [[nodiscard]] test::RawPeer hold(std::size_t bytes) const {
+    auto peer = impostor.accept();
+    REQUIRE(peer.shake_hands("PUB"));
+    REQUIRE(peer.send(test::repeated(test::zmtp::frame("", 1), bytes)));
+    return peer;
+  }
+  // Whether it is cut within the time.
+  [[nodiscard]] bool cut(std::chrono::milliseconds time) const {
+    const auto end = std::chrono::steady_clock::now() + time;
+    while (link->cuts() == 0 && std::chrono::steady_clock::now() < end) {
+      static_cast<void>(link->next_refusal());
+      std::this_thread::sleep_for(1ms);
+    }
+    return link->cuts() > 0;
   }
 };
 
@@ -136,6 +154,37 @@ TEST_CASE("many connections one after the other bring no more than one while not
     }
   }
   CHECK(part.text() == "hello");
+}
+
+TEST_CASE("what waits in all links together is bounded, and those with the least keep it") {
+  const Linked honest;
+  const auto sender = honest.impostor.accept();
+  REQUIRE(sender.shake_hands("PUB"));
+  REQUIRE(sender.send(test::zmtp::frame("stats", 1) + test::zmtp::frame(std::string(8'000, 'x'))));
+  {
+    // Together 2.1 MB: two of them at least have to go.
+    const std::array<Linked, 7> hostile;
+    std::vector<test::RawPeer> peers;
+    for (const Linked& each : hostile) peers.push_back(each.hold(300'000));
+    int cuts = 0;
+    const auto end = std::chrono::steady_clock::now() + 10s;
+    while (cuts < 2 && std::chrono::steady_clock::now() < end) {
+      cuts = 0;
+      for (const Linked& each : hostile) cuts += each.cut(1ms) ? 1 : 0;
+    }
+    CHECK(cuts >= 2);
+  }
+  // Links that are gone take nothing of the others' room.
+  const Linked first;
+  const Linked second;
+  const auto peer_of_first = first.hold(1'200'000);
+  CHECK_FALSE(first.cut(200ms));
+  const auto peer_of_second = second.hold(600'000);
+  CHECK(first.cut(10s));
+  CHECK_FALSE(second.cut(50ms));
+  CHECK(honest.next() == "stats");
+  CHECK(honest.next().size() == 8'000);
+  CHECK_FALSE(honest.cut(1ms));
 }
 
 TEST_CASE("a driver's connection to another posed is guarded, too") {
