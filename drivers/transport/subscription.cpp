@@ -28,6 +28,7 @@ static_assert(net::kMaxReceivedPart > std::int64_t{kMaxChunk});
 // of a large skeleton at 120 Hz.
 constexpr int kQueue = 128 * 1024;
 constexpr int kMaxDiscarded = 256;  // for one message; more than the queue holds
+constexpr int kLinkThreads = 2;     // the monitor's, and the one that receives
 
 Error refusal_error(net::Refusal refusal, const SubscriptionSettings& settings) {
   const std::string daemon = "the daemon at " + settings.endpoint;
@@ -90,10 +91,11 @@ Result<std::shared_ptr<net::Context>> subscription_context() {
   static std::mutex mutex;
   static std::weak_ptr<net::Context> open;
   const std::scoped_lock lock(mutex);
-  // Opened first in any case, because that tells whether the threads of one more link may begin.
-  auto fresh = TRY(net::open_context());
-  if (auto known = open.lock()) return known;
-  auto made = std::make_shared<net::Context>(std::move(fresh));
+  if (auto known = open.lock()) {
+    TRY(net::check_threads(kLinkThreads));
+    return known;
+  }
+  auto made = std::make_shared<net::Context>(TRY(net::open_context()));
   open = made;
   return made;
 }

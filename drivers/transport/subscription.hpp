@@ -36,7 +36,8 @@ struct SubscriptionSettings {
 // Checks the endpoint and reads the key files, without connecting. Cold.
 Result<> check_subscription(const SubscriptionSettings& settings);
 
-// The context of all subscriptions, while somebody keeps it. Memory that libzmq's thread took for a
+// The context of all subscriptions, while somebody keeps it: one thread of libzmq serves them all.
+// An error when the threads of one more link cannot begin. Memory that libzmq's thread took for a
 // peer that sends too much stays with that thread where posed locks its memory (mlockall): the
 // next link, of whichever source, uses it again. Cold; any thread.
 Result<std::shared_ptr<net::Context>> subscription_context();

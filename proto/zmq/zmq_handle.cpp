@@ -56,22 +56,6 @@ bool is_listened_to(const std::string& file) {
   return answered;
 }
 
-// libzmq ends the process where it may not begin a thread, with a line about its source code. So as
-// many are tried first, and some of posed's own, all at once.
-Result<> try_threads() {
-  constexpr int kThreads = 4;
-  std::vector<std::jthread> threads;
-  std::promise<void> end;  // breaks, which ends the wait, before the threads are joined
-  const auto ended = end.get_future().share();
-  try {
-    for (int i = 0; i < kThreads; ++i) threads.emplace_back([ended] { ended.wait(); });
-  } catch (const std::system_error& error) {
-    return fail("no more threads may begin (" + std::string(error.what()) +
-                "): allow more processes (ulimit -u) or memory (ulimit -v)");
-  }
-  return {};
-}
-
 // libzmq also ends the process where it may open no more descriptors. A context with a socket needs
 // six, and to look up an address takes one.
 Result<> try_descriptors() {
@@ -88,8 +72,24 @@ Result<> try_descriptors() {
 
 }  // namespace
 
+Result<> check_threads(int count) {
+  std::vector<std::jthread> threads;
+  std::promise<void> end;  // breaks, which ends the wait, before the threads are joined
+  const auto ended = end.get_future().share();
+  try {
+    for (int i = 0; i < count; ++i) threads.emplace_back([ended] { ended.wait(); });
+  } catch (const std::system_error& error) {
+    return fail("no more threads may begin (" + std::string(error.what()) +
+                "): allow more processes (ulimit -u) or memory (ulimit -v)");
+  }
+  return {};
+}
+
 Result<Context> open_context() {
-  TRY(try_threads());
+  // libzmq ends the process where it may not begin a thread, with a line about its source code. So
+  // as many are tried first, and some of posed's own, all at once.
+  constexpr int kThreads = 4;
+  TRY(check_threads(kThreads));
   Context context(zmq_ctx_new());
   if (!context) return fail("ZeroMQ does not start: " + last_error());
   return context;

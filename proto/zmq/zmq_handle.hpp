@@ -60,6 +60,8 @@ class Message {
 };
 
 Result<Context> open_context();
+// An error when so many threads cannot begin now. Cold.
+Result<> check_threads(int count);
 
 // A socket that drops unsent messages when it is closed (linger 0).
 Result<Socket> open_socket(void* context, int type);
