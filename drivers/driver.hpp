@@ -185,7 +185,9 @@ struct Description {
   std::string driver;  // registry name
   // Device info: the device's own header (a BVH's HIERARCHY); input of the decoder.
   std::string text;
-  std::string identity;  // stable name of the device: path, serial number
+  // Stable name of the device: path, serial number, address. One that listens on port 0 has another
+  // at each opening.
+  std::string identity;
   // Null for a device that emits samples only, and for one with several bodies
   // (Driver::make_layout).
   std::shared_ptr<const Skeleton> skeleton;

@@ -52,7 +52,9 @@ struct SourceType {
     auto transport = TRY(Self::connect(options, ports));
     // With port 0 the kernel chooses one, which the senders must know.
     const auto* udp = dynamic_cast<const UdpTransport*>(transport.get());
-    if (udp != nullptr && identity.ends_with(":0")) identity = "udp " + udp->endpoint(0);
+    const bool listens =
+        udp != nullptr && identity == "udp " + option<std::string>(options, "listen");
+    if (listens && identity.ends_with(":0")) identity = "udp " + udp->endpoint(0);
     return Opened{
         .identity = std::move(identity), .transport = std::move(transport), .poll = Self::poll()};
   }

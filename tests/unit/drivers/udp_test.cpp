@@ -105,6 +105,11 @@ TEST_CASE("a source names the port that the kernel chose") {
     CHECK(device->description.identity == "udp " + udp.endpoint(0));
     CHECK_FALSE(device->description.identity.ends_with(":0"));
   }
+  // A device is not named after the socket that asks it.
+  const auto natnet = find_driver("natnet")->open(
+      {{"server", std::string("127.0.0.1:0")}, {"listen", std::string("0.0.0.0:0")}}, ports);
+  REQUIRE(natnet);
+  CHECK(natnet->description.identity == "udp 127.0.0.1:0");
 }
 
 TEST_CASE("datagrams come one by one, over IPv4 and IPv6") {
