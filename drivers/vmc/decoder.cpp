@@ -173,7 +173,7 @@ RT_SAFE std::size_t VmcDecoder::bone_of(std::string_view name) const noexcept {
 
 RT_SAFE VmcDecoder::Survey VmcDecoder::survey(std::span<const std::byte> packet) noexcept {
   Survey found;
-  each_message(packet, [&](const OscMessage& message) noexcept {
+  const bool all_read = each_message(packet, [&](const OscMessage& message) noexcept {
     found.any = true;
     found.of_vmc = found.of_vmc || message.address.starts_with(kAddressPrefix);
     OscArguments arguments(message);
@@ -190,6 +190,7 @@ RT_SAFE VmcDecoder::Survey VmcDecoder::survey(std::span<const std::byte> packet)
       found.time = arguments.ok() ? clock_.accept(time_s) : Outcome::kOutOfRange;
     }
   });
+  found.any = found.any || !all_read;
   return found;
 }
 
