@@ -2,12 +2,8 @@
 #include <catch2/catch.hpp>
 
 #include <poll.h>
-#include <pthread.h>
-#include <sys/resource.h>
-#include <unistd.h>
 
 #include <chrono>
-#include <fstream>
 #include <string>
 #include <thread>
 
@@ -49,38 +45,6 @@ struct SubscriptionRig {
   }
 };
 
-// Three more threads may begin while it lives: each has a stack of 1 GB, and there is room for no
-// more. Stacks that large are not kept when their threads end.
-class FewThreads {
- public:
-  FewThreads() {
-    pthread_getattr_default_np(&stack_before_);
-    pthread_attr_t large = stack_before_;
-    pthread_attr_setstacksize(&large, kStack);
-    REQUIRE(pthread_setattr_default_np(&large) == 0);
-    std::ifstream statm("/proc/self/statm");
-    std::size_t pages = 0;
-    REQUIRE(statm >> pages);
-    REQUIRE(getrlimit(RLIMIT_AS, &room_before_) == 0);
-    const rlimit room{
-        .rlim_cur = pages * static_cast<std::size_t>(sysconf(_SC_PAGESIZE)) + 7 * kStack / 2,
-        .rlim_max = room_before_.rlim_max};
-    REQUIRE(setrlimit(RLIMIT_AS, &room) == 0);
-  }
-  ~FewThreads() {
-    setrlimit(RLIMIT_AS, &room_before_);
-    pthread_setattr_default_np(&stack_before_);
-    pthread_attr_destroy(&stack_before_);
-  }
-  FewThreads(const FewThreads&) = delete;
-  FewThreads& operator=(const FewThreads&) = delete;
-
- private:
-  static constexpr std::size_t kStack = std::size_t{1} << 30;
-  pthread_attr_t stack_before_{};
-  rlimit room_before_{};
-};
-
 std::string text_of(const Chunk& chunk) {
   return {reinterpret_cast<const char*>(chunk.bytes.data()), chunk.bytes.size()};
 }
@@ -105,14 +69,6 @@ TEST_CASE("the context of a subscription outlives its link") {
   auto second = other.subscribe({.endpoint = rig.endpoint, .topics = {"pose/ann"}});
   REQUIRE(second);
   CHECK(context.use_count() == users + 2);  // the factory and its link
-}
-
-TEST_CASE("a source is linked again where only its own threads may begin") {
-  SubscriptionRig rig;
-  rig.transport.reset();
-  const FewThreads three;
-  CHECK_FALSE(net::open_context());
-  CHECK(rig.ports.subscribe({.endpoint = rig.endpoint, .topics = {"pose/ann"}}));
 }
 
 TEST_CASE("when nobody reads, the newest messages stay and the others are counted") {
