@@ -21,12 +21,12 @@ export const TILES = [
         : '',
   ],
   [
-    'To this page',
+    'Delay to this page',
     'half of the poses of the last 3 s took at most this from their arrival at posed to this page',
     ({ history }) => ms(history.callback_ms),
   ],
   [
-    'Age of the picture',
+    'Delay until drawn',
     'from arrival at posed until drawn here: half of the poses of the last 3 s took at most this',
     ({ history }) => `${ms(history.picture_ms)}${isSlow(history.picture_ms) ? ': this page is slow' : ''}`,
   ],

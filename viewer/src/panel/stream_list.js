@@ -35,7 +35,7 @@ export class StreamList {
     const live = stats.state === 'live' && !stats.away;
     write(row.rate, live ? `${stats.rate_hz.toFixed(stats.rate_hz < 99.95 ? 1 : 0)} Hz` : '');
     const late_ms = stats.publish?.p99_us > 0 ? Math.round(stats.publish.p50_us / 1000) : NaN;
-    write(row.latency, live && late_ms >= 1 ? `${late_ms} ms later` : ''); // else at once
+    write(row.latency, live && late_ms >= 1 ? `${late_ms} ms delay` : ''); // else at once
     write(row.sentence, sentence);
     row.sentence.hidden = sentence === '';
   }

@@ -122,7 +122,7 @@ export class StyleControls {
       facts.push(
         style_gate > 0.95
           ? 'the model knows this motion'
-          : `the model knows this motion to ${Math.round(100 * style_gate)} %: so much of the style is seen`,
+          : `motion ${Math.round(100 * style_gate)} % familiar to the model: so much of the style is seen`,
       );
     }
     if (style_estimate >= LEAST_TOLD) {

@@ -15,7 +15,7 @@ function styledWords(stream) {
 // A line may end before the label and behind it.
 function labelWords({ verb, label, probability }) {
   const words = label.replaceAll(' ', '\u00a0');
-  return verb === 'plays' ? `posed plays ${words}` : `recognised ${words}, ${percent(probability)} sure`;
+  return verb === 'plays' ? `plays ${words}` : `recognised ${words}, ${percent(probability)} sure`;
 }
 
 function words(stream, main) {

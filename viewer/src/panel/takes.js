@@ -99,6 +99,6 @@ export class Takes {
     const now = trouble ? ', NOTHING IS WRITTEN' : '';
     const missing = errors > 0 || lost > 0 ? `, ${errors} errors, ${lost} chunks lost` : '';
     const clock = take ? ` ${minutes((stats.time_ns - take.start_ns) / 1e9)}` : '';
-    return `${take ? takeTitle(take.number, take.name) : 'recording, no take now'}${clock}${now}${missing}`;
+    return `${take ? takeTitle(take.number, take.name) : 'recording, no take begun'}${clock}${now}${missing}`;
   }
 }

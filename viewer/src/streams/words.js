@@ -29,8 +29,8 @@ export function stateOf(stats) {
   if (stats.state !== 'live') return state(stats.state, 'busy');
   const lost = stats.dropped + stats.shed + stats.kernel_dropped;
   const were = lost === 1 ? '1 frame was lost' : `${lost} frames were lost`;
-  if (stats.lossy) return state('lossy', 'bad', `${were} so far, some in the last 10 s`);
-  return state('live', 'good', lost > 0 ? `${were} so far, none of late` : '');
+  if (stats.lossy) return state('losing', 'bad', `${were} so far, some in the last 10 s`);
+  return state('live', 'good', lost > 0 ? `${were} so far, none recently` : '');
 }
 
 // How current a pose is, for people; empty when it is measured.

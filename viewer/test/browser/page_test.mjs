@@ -128,7 +128,7 @@ pageTests(
         clock.toPage_ms = (monotonic_ms) => monotonic_ms - clock.offset_ms - 8000;
       });
       await page.locator('.link[data-tone="busy"]', { hasText: /slow: picture 8\.\d s old/ }).waitFor(PATIENCE);
-      await tile(page, 'Age of the picture').getByText(/^8\.\d s: this page is slow/).waitFor(PATIENCE);
+      await tile(page, 'Delay until drawn').getByText(/^8\.\d s: this page is slow/).waitFor(PATIENCE);
       await page.evaluate(() => delete globalThis.posedPage.clock.toPage_ms);
       await link.and(page.locator('[data-tone="good"]')).waitFor(PATIENCE);
     },
@@ -418,7 +418,7 @@ pageTests(
         .evaluate((row) => {
           const whole = row.cloneNode(true);
           whole.querySelector('strong').textContent = 'camera-right';
-          for (const number of whole.querySelectorAll('.number')) number.textContent = '109 ms later';
+          for (const number of whole.querySelectorAll('.number')) number.textContent = '109 ms delay';
           row.parentElement.append(whole);
           const name = document.createRange();
           name.selectNodeContents(whole.querySelector('strong'));
@@ -702,7 +702,7 @@ const wears = (page, name) =>
     PATIENCE,
   );
 
-const TIMES = ['To this page', 'Age of the picture'];
+const TIMES = ['Delay to this page', 'Delay until drawn'];
 
 async function withoutTimes(page) {
   await page.getByText('Time in each step').waitFor(PATIENCE);

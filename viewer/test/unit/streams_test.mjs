@@ -133,8 +133,8 @@ test('states in words, the worst first', () => {
   assert.equal(stateOf({ ...live, state: 'stale' }).tone, 'busy');
   assert.equal(stateOf({ ...live, refusal: 'no hips', away: true }).sentence, 'no hips');
   assert.equal(stateOf({ ...live, shed: 3 }).tone, 'good');
-  assert.match(stateOf({ ...live, shed: 3 }).sentence, /3 frames .* none of late/);
-  assert.equal(stateOf({ ...live, shed: 3, lossy: true }).word, 'lossy');
+  assert.match(stateOf({ ...live, shed: 3 }).sentence, /3 frames .* none recently/);
+  assert.equal(stateOf({ ...live, shed: 3, lossy: true }).word, 'losing');
   assert.equal(stateOf({ ...live, shed: 3, lossy: true }).tone, 'bad');
 });
 
