@@ -95,7 +95,8 @@ Result<std::shared_ptr<net::Context>> subscription_context() {
     TRY(net::check_threads(kLinkThreads));
     return known;
   }
-  auto made = std::make_shared<net::Context>(TRY(net::open_context()));
+  auto context = TRY(net::open_context());
+  auto made = std::make_shared<net::Context>(std::move(context));
   open = made;
   return made;
 }
