@@ -213,11 +213,12 @@ TEST_CASE("two moves take out what sensors show of each other", "[glove]") {
        ", poses once " + text(once) + ", poses " + text(posed) + ", moves " + text(moved));
   CHECK(worse == std::array{0, 0});  // of the wearers, than by default
   for (std::size_t i = 0; i < 2; ++i) CHECK(posed[i] < once[i]);
-  CHECK(std::sqrt(posed[0]) < 3.0);
-  CHECK(std::sqrt(posed[1]) < 3.5);
   for (std::size_t i = 0; i < 2; ++i) CHECK(moved[i] < std::min(plain[i], posed[i]));
-  CHECK(std::sqrt(moved[0]) < 3.0);
-  CHECK(std::sqrt(moved[1]) < 3.5);
+  if (test::few_seeds()) return;  // the limits are those of twenty wearers
+  for (const auto& errors : {posed, moved}) {
+    CHECK(std::sqrt(errors[0]) < 3.0);
+    CHECK(std::sqrt(errors[1]) < 3.5);
+  }
 }
 
 TEST_CASE("moves that are not made change nothing", "[glove]") {
