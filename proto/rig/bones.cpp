@@ -89,9 +89,8 @@ bool hands_lack_tips(const Figure& figure, const BoneJoints& bones) {
     if (figure.children(hand).empty()) ++lack;
     for (const int child : figure.children(hand)) {
       const auto finger = figure.main_chain(child);
-      const bool in_palm =
-          finger.size() > 1 && figure[finger[0]].offset.norm() < figure[finger[1]].offset.norm();
-      lack += std::ssize(finger) == kFingerJoints + (in_palm ? 1 : 0) ? 1 : -1;
+      const int whole = kFingerJoints + (begins_in_palm(figure, finger) ? 1 : 0);
+      lack += std::ssize(finger) == whole ? 1 : -1;
     }
   }
   return lack > 0;

@@ -78,6 +78,10 @@ void find_limbs(const Figure& figure, const std::vector<JointName>& names, BoneJ
                                                        const std::vector<JointName>& names,
                                                        SidesBy& sides_by, int without = -1);
 
+// Whether a finger's chain begins with a joint in the palm: the bone to it is shorter than the
+// next.
+[[nodiscard]] bool begins_in_palm(const Figure& figure, const std::vector<int>& finger);
+
 // A hand without a body, and the joints of its fingers, thumb first.
 struct HandShape {
   int palm = 0;

@@ -334,6 +334,10 @@ std::optional<BoneJoints> limbs_by_shape(const Figure& figure, const std::vector
   return bones;
 }
 
+bool begins_in_palm(const Figure& figure, const std::vector<int>& finger) {
+  return finger.size() > 1 && figure[finger[0]].offset.norm() < figure[finger[1]].offset.norm();
+}
+
 std::optional<HandShape> hand_by_shape(const Figure& figure) {
   HandShape hand;
   while (figure.children(hand.palm).size() == 1) hand.palm = figure.children(hand.palm).front();
@@ -351,8 +355,7 @@ std::optional<HandShape> hand_by_shape(const Figure& figure) {
   if (!order_across(figure, hand.palm, thumb, std::span(chains).subspan(1))) return std::nullopt;
   for (std::size_t f = 0; f < chains.size(); ++f) {
     auto& chain = chains[f];
-    const bool in_palm = f > 0 && chain.size() > kFingerJoints &&
-                         figure[chain[0]].offset.norm() < figure[chain[1]].offset.norm();
+    const bool in_palm = f > 0 && chain.size() > kFingerJoints && begins_in_palm(figure, chain);
     if (in_palm) chain.erase(chain.begin());
     if (chain.size() > kFingerJoints) chain.resize(kFingerJoints);
     hand.fingers[f] = std::move(chain);
