@@ -1,10 +1,11 @@
-// The camera and the worker that finds hands in its pictures. Nothing is opened or loaded before
-// start(), which loads while the browser asks its user; stop() ends the camera's tracks and the
-// worker at once.
+// The camera and the worker that finds hands in its pictures. prepare() loads the worker, so that it
+// is ready when the browser has asked its user; start() opens the camera. stop() ends the camera's
+// tracks at once, and forget() the worker too; one that is not used ends by itself.
 
 const WORKER = '/camera/finder.js';
 const WIDTH = 640;
 const HEIGHT = 480;
+const KEPT_MS = 60000; // a worker without a camera: it holds about 100 MB
 
 const WORDS = {
   NotAllowedError: 'the browser may not use the camera: allow it beside the address of this page',
@@ -20,12 +21,19 @@ export class Camera {
   #worker = null;
   #ready = false;
   #busy = false;
+  #wanted = false;
+  #unused = null; // the timer that ends a worker without a camera
   #run = 0; // counts starts and stops: what an earlier one has begun is no more wanted
 
   // handlers: found({hands, time_ms, picture}), ended(sentence). The picture is found()'s to close.
   constructor(video, handlers) {
     this.video = video;
     this.handlers = handlers;
+  }
+
+  // From start() to stop(), also while the browser asks its user.
+  get wanted() {
+    return this.#wanted;
   }
 
   get running() {
@@ -35,7 +43,9 @@ export class Camera {
   async start(deviceId) {
     this.stop();
     const run = this.#run;
-    this.#load();
+    this.#wanted = true;
+    clearTimeout(this.#unused);
+    this.prepare();
     const stream = await navigator.mediaDevices.getUserMedia({
       audio: false,
       video: {
@@ -55,18 +65,36 @@ export class Camera {
 
   stop() {
     this.#run += 1;
+    this.#wanted = false;
     if (this.#stream) end(this.#stream);
     this.#stream = null;
     this.video.srcObject = null;
+    this.#endUnused();
+  }
+
+  forget() {
+    this.stop();
+    clearTimeout(this.#unused);
     this.#worker?.terminate();
     this.#worker = null;
     this.#ready = false;
     this.#busy = false;
   }
 
+  prepare() {
+    if (!this.#worker) this.#load();
+    if (!this.#wanted) this.#endUnused();
+  }
+
+  #endUnused() {
+    clearTimeout(this.#unused);
+    this.#unused = setTimeout(() => this.forget(), KEPT_MS);
+  }
+
   #end(sentence) {
-    this.stop(); // also while the browser asks
-    this.handlers.ended(sentence);
+    const wanted = this.#wanted; // who only looked at the button hears nothing
+    this.forget();
+    if (wanted) this.handlers.ended(sentence);
   }
 
   #load() {
@@ -75,14 +103,12 @@ export class Camera {
       if (worker === this.#worker) this.#end('what finds hands cannot be loaded');
     };
     worker.onmessage = ({ data }) => {
-      if (worker !== this.#worker) {
-        data.picture?.close();
-        return;
-      }
+      if (worker !== this.#worker) return;
       this.#busy = false;
       if (data.error) this.#end(`no hands can be found: ${data.error}`);
       else if (data.ready) this.#ready = true;
-      else this.handlers.found(data);
+      else if (data.run === this.#run) this.handlers.found(data);
+      else data.picture.close();
     };
     this.#worker = worker;
   }
@@ -104,11 +130,15 @@ export class Camera {
     this.#busy = true;
     try {
       const picture = await createImageBitmap(this.video);
-      if (run === this.#run) this.#worker.postMessage({ picture, time_ms }, [picture]);
-      else picture.close();
+      if (run === this.#run) {
+        this.#worker.postMessage({ picture, time_ms, run }, [picture]);
+        return;
+      }
+      picture.close();
     } catch {
-      this.#busy = false; // no picture yet
+      // There is no picture yet.
     }
+    this.#busy = false;
   }
 }
 

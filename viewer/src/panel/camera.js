@@ -64,8 +64,11 @@ export class CameraPanel {
       found: (found) => this.#found(found),
       ended: (sentence) => this.#show(sentence),
     });
-    document.addEventListener('visibilitychange', () => document.hidden && this.stop(HIDDEN));
-    addEventListener('pagehide', () => this.stop());
+    // Who comes near the button probably wants the camera.
+    for (const near of ['pointerenter', 'focusin'])
+      this.element.addEventListener(near, () => this.readOnly || this.camera.prepare());
+    document.addEventListener('visibilitychange', () => document.hidden && this.#leave());
+    addEventListener('pagehide', () => this.#leave());
   }
 
   // hello: the bridge's greeting; null while there is no connection.
@@ -92,6 +95,11 @@ export class CameraPanel {
     if (!this.camera.running && !this.#starting) return;
     this.camera.stop(); // also while the browser asks the user
     this.#show(sentence);
+  }
+
+  #leave() {
+    this.stop(HIDDEN);
+    this.camera.forget();
   }
 
   async #start() {

@@ -72,9 +72,15 @@ test('a hand before the camera is sent, until the page may not or is hidden', op
       return mediaDevices.getUserMedia(what);
     };
   });
-  const loading = page.waitForRequest(/finder\.js/, PATIENCE); // while the user is asked
-  await button(page).click();
+  const loads = [];
+  page.on('request', (request) => {
+    if (/finder\.js/.test(request.url())) loads.push(request);
+  });
+  const loading = page.waitForRequest(/finder\.js/, PATIENCE); // before the user is asked
+  await page.locator('.camera').hover();
   await loading;
+  assert.equal((await panelOf(page)).running, false);
+  await button(page).click();
   await page.evaluate(() => globalThis.answer());
   await enough(page, ENOUGH);
   await keepTrack(page);
@@ -124,6 +130,7 @@ test('a hand before the camera is sent, until the page may not or is hidden', op
   bridge.say({ type: 'control', may_control: false, read_only_reason: 'only looking' });
   await page.waitForFunction(() => globalThis.track.readyState === 'ended', undefined, PATIENCE);
   assert.ok(await button(page).isDisabled());
+  assert.equal(loads.length, 2, 'what finds hands stays until the page is hidden');
   assert.deepEqual(page.foreign, []);
   assert.deepEqual(page.errors, []);
 });
