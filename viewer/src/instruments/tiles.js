@@ -39,8 +39,8 @@ export const TILES = [
         : '',
   ],
   ['Jitter', 'how unevenly frames arrive', ({ stream }) => ms(stream.jitter.ms)],
-  ['Dropped', 'frames that found a queue full', ({ stats }) => count(stats.dropped)],
-  ['Skipped', 'frames skipped for newer ones', ({ stats }) => count(stats.shed)],
+  ['Dropped, queue full', 'frames that found no room on their way to the publisher', ({ stats }) => count(stats.dropped)],
+  ['Skipped for newer', 'frames that waited until a newer one had come', ({ stats }) => count(stats.shed)],
   [
     'Lost in the kernel',
     'datagrams that were not read in time',

@@ -9,7 +9,7 @@ function styledWords(stream) {
   const alpha = stream.parameter('style', 'alpha');
   if (!alpha || !stream.stage('style').model) return '';
   const faded = alpha.value !== 0 && stream.stats.style_gate < KNOWN;
-  return `styled, α ${signed(alpha.value, 2)}${faded ? '\u00a0· fades: the model does not know this motion' : ''}`;
+  return `styled, amount ${signed(alpha.value, 2)}${faded ? '\u00a0· fades: the model does not know this motion' : ''}`;
 }
 
 // A line may end before the label and behind it.
