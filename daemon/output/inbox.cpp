@@ -6,12 +6,12 @@
 namespace posed::output {
 
 bool Delivery::put(std::size_t place, const Frame& frame) noexcept {
-  const bool full = count_ == kDepth;
+  const bool full = count_ == frames_.size();
   if (full) {
-    first_ = (first_ + 1) % kDepth;
+    first_ = (first_ + 1) % frames_.size();
     --count_;
   }
-  Entry& entry = frames_[(first_ + count_) % kDepth];
+  Entry& entry = frames_[(first_ + count_) % frames_.size()];
   entry.place = place;
   entry.frame = frame;
   ++count_;
@@ -27,9 +27,9 @@ void Delivery::swap_frames(Delivery& other) noexcept {
 std::size_t Delivery::remove(std::size_t place) noexcept {
   std::size_t kept = 0;
   for (std::size_t i = 0; i < count_; ++i) {
-    const Entry& entry = frames_[(first_ + i) % kDepth];
+    const Entry& entry = frames_[(first_ + i) % frames_.size()];
     if (entry.place == place) continue;
-    if (kept != i) frames_[(first_ + kept) % kDepth] = entry;
+    if (kept != i) frames_[(first_ + kept) % frames_.size()] = entry;
     ++kept;
   }
   return std::exchange(count_, kept) - kept;

@@ -36,18 +36,20 @@ using LiveStreams = std::vector<std::shared_ptr<const LiveStream>>;
 // The content of an inbox at one moment.
 class Delivery {
  public:
-  static constexpr std::size_t kDepth = 16;  // frames
+  // Frames of each place, so that a crowd bridges as long a wait as one person.
+  static constexpr std::size_t kDepth = 16;
 
-  Delivery() : frames_(kDepth) {}
+  explicit Delivery(std::size_t places)
+      : streams(places), samples(places), frames_(kDepth * places) {}
 
-  LiveStreams streams{};
-  std::vector<std::optional<Sample>> samples{};  // [place] the newest
+  LiveStreams streams;
+  std::vector<std::optional<Sample>> samples;  // [place] the newest
 
   // Calls use(place, frame) for each frame, the oldest first.
   template <typename Use>
   void for_each(Use&& use) const {
     for (std::size_t i = 0; i < count_; ++i) {
-      const Entry& entry = frames_[(first_ + i) % kDepth];
+      const Entry& entry = frames_[(first_ + i) % frames_.size()];
       use(entry.place, entry.frame);
     }
   }
@@ -73,10 +75,7 @@ class Inbox {
   // `names` are the wanted streams; an empty name means none. `wake` is notified of everything new
   // and outlives the inbox.
   Inbox(std::vector<std::string> names, system::EventFd& wake)
-      : names_(std::move(names)), wake_(wake) {
-    waiting_.streams.resize(names_.size());
-    waiting_.samples.resize(names_.size());
-  }
+      : names_(std::move(names)), wake_(wake), waiting_(names_.size()) {}
 
   [[nodiscard]] bool wants(std::string_view stream) const noexcept;
 

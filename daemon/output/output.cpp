@@ -55,6 +55,7 @@ Output::Output(const config::OutputConfig& config, std::unique_ptr<system::Event
       address_(address_of(config)),
       wake_(std::move(wake)),
       inbox_(streams_of(config), *wake_),
+      delivery_(streams_of(config).size()),
       limit_(config.rate_hz) {
   if (together) gathering_.emplace(config.people());
 }

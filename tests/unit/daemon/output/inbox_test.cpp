@@ -26,7 +26,7 @@ Frame numbered(std::uint32_t stream, std::uint64_t sequence) {
 struct InboxRig {
   std::unique_ptr<system::EventFd> wake = system::EventFd::open().value();
   Inbox inbox{{"ann", "", "glove"}, *wake};
-  Delivery delivery;
+  Delivery delivery{3};
 
   // "B1 B2 R7": places and sequences.
   std::string taken() {
@@ -103,16 +103,39 @@ TEST_CASE("an inbox takes the frames of the streams that its output names, in th
 
 TEST_CASE("a full inbox keeps the newest frames and counts the others") {
   InboxRig rig;
+  constexpr std::uint64_t kRoom = 3 * Delivery::kDepth;
   rig.inbox.stream_comes(info_of(3, "ann", nullptr));
   for (int round = 0; round < 3; ++round) {  // the ring begins at another place each time
-    for (std::uint64_t i = 1; i <= Delivery::kDepth + 5; ++i) rig.inbox.frame(numbered(3, i));
+    for (std::uint64_t i = 1; i <= kRoom + 5; ++i) rig.inbox.frame(numbered(3, i));
     std::string expected;
-    for (std::uint64_t i = 6; i <= Delivery::kDepth + 5; ++i) {
+    for (std::uint64_t i = 6; i <= kRoom + 5; ++i) {
       expected += "B" + std::to_string(i) + " ";
     }
     CHECK(rig.taken() == expected);
   }
   CHECK(rig.inbox.dropped() == 15);
+}
+
+TEST_CASE("an inbox bridges a wait for each of many people as for one") {
+  constexpr std::uint32_t kPeople = 16;
+  const auto wake = system::EventFd::open().value();
+  std::vector<std::string> names;
+  for (std::uint32_t i = 0; i < kPeople; ++i) names.push_back("ann-" + std::to_string(i));
+  Inbox inbox(names, *wake);
+  for (std::uint32_t i = 0; i < kPeople; ++i) inbox.stream_comes(info_of(i, names[i], nullptr));
+  for (std::uint64_t step = 0; step < Delivery::kDepth; ++step) {
+    for (std::uint32_t i = 0; i < kPeople; ++i) inbox.frame(numbered(i, step));
+  }
+  CHECK(inbox.dropped() == 0);
+  Delivery delivery(kPeople);
+  inbox.drain(delivery);
+  std::uint64_t taken = 0;
+  delivery.for_each([&](std::size_t place, const Frame& frame) {
+    CHECK(place == taken % kPeople);
+    CHECK(frame.header.sequence == taken / kPeople);
+    ++taken;
+  });
+  CHECK(taken == kPeople * Delivery::kDepth);
 }
 
 TEST_CASE("the frames of a stream that leaves or returns otherwise are not sent any more") {
