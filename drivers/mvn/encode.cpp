@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <numbers>
 #include <span>
 #include <string>
 
@@ -33,16 +34,32 @@ void write_vector(BigEndianWriter& writer, const Vec3f& v) {
   write_words(writer, std::array{bits(v[0]), bits(v[1]), bits(v[2])});
 }
 
+// The angle whose sine and cosine are in this proportion [degrees]; 0 if both are 0. The polynomial
+// is that of Cephes (atanf.c), within 1e-7 rad of the arc tangent up to 22.5 degrees, and several
+// times as fast as the library's function.
+float angle_deg(double sine, double cosine) {
+  constexpr double kTurn = std::numbers::pi / 4.0;
+  const double s = std::abs(sine), c = std::abs(cosine);
+  const double shorter = std::min(s, c), longer = std::max(s, c);
+  const bool steep = shorter > (std::numbers::sqrt2 - 1.0) * longer;
+  const double above = steep ? shorter - longer : shorter;
+  const double below = steep ? shorter + longer : longer;
+  const double t = below > 0.0 ? above / below : 0.0;
+  const double z = t * t;
+  double angle_rad =
+      t + t * z *
+              (((8.05374449538e-2 * z - 1.38776856032e-1) * z + 1.99777106478e-1) * z -
+               3.33329491539e-1);
+  if (steep) angle_rad += kTurn;
+  if (s > c) angle_rad = 2.0 * kTurn - angle_rad;
+  if (cosine < 0.0) angle_rad = 4.0 * kTurn - angle_rad;
+  return static_cast<float>(std::copysign(angle_rad, sine) / kDegree);
+}
+
 // Angles about the fixed axes X, Y, Z, in this order of turning [degrees]. Each is read after the
-// one before is undone, so that they make the rotation exactly even where X and Z are one axis. A
-// float's arc tangent is as exact as the floats that are sent, and several times faster than a
-// double's.
+// one before is undone, so that they make the rotation exactly even where X and Z are one axis.
 Vec3f to_euler(const Quatf& rotation) {
   const Eigen::Matrix3d m = to_eigen_double(rotation).toRotationMatrix();
-  const auto angle_deg = [](double sine, double cosine) {
-    const float angle_rad = std::atan2(static_cast<float>(sine), static_cast<float>(cosine));
-    return static_cast<float>(static_cast<double>(angle_rad) / kDegree);
-  };
   const double length = std::sqrt(m(0, 0) * m(0, 0) + m(1, 0) * m(1, 0));
   const double c = length > 0.0 ? m(0, 0) / length : 1.0;
   const double s = length > 0.0 ? m(1, 0) / length : 0.0;
