@@ -17,19 +17,43 @@ namespace axis = drivers::axis;
 
 constexpr std::uint8_t kOrder = 0;  // YXZ, as the applications are set at first
 
-// Whether the joints are those of an avatar of Axis Neuron or Axis Studio.
-bool is_axis_avatar(const Skeleton& skeleton) {
+// The figure of Axis Neuron or Axis Studio whose joints these are; none: of neither.
+std::optional<axis::Figure> figure_of(const Skeleton& skeleton) {
   if (skeleton.root_joint < 0 || skeleton.joints.size() != skeleton.root_joint + axis::kBones) {
-    return false;
+    return std::nullopt;
   }
-  return std::ranges::any_of(std::array{axis::Figure::kPro, axis::Figure::kStudio},
-                             [&](axis::Figure figure) {
-                               for (std::size_t b = 0; b < axis::kBones; ++b) {
-                                 const Joint& joint = skeleton.joints[skeleton.root_joint + b];
-                                 if (joint.name != axis::bone_name(b, figure)) return false;
-                               }
-                               return true;
-                             });
+  for (const axis::Figure figure : {axis::Figure::kPro, axis::Figure::kStudio}) {
+    bool same = true;
+    for (std::size_t b = 0; b < axis::kBones && same; ++b) {
+      same = skeleton.joints[skeleton.root_joint + b].name == axis::bone_name(b, figure);
+    }
+    if (same) return figure;
+  }
+  return std::nullopt;
+}
+
+// What the applications would send of a person who is one of their avatars: turns and lengths of
+// all bones, also of those that no other figure has. Null: it is none, or has a reference, or rests
+// in another way.
+std::shared_ptr<const Skeleton> own_avatar(const Skeleton& skeleton, axis::AvatarEntry& entry) {
+  constexpr double kSame_rad = 1e-4;
+  entry.figure = figure_of(skeleton);
+  if (!entry.figure || skeleton.root_joint != 0) return nullptr;
+  for (std::size_t b = 1; b < axis::kBones; ++b) {
+    const Eigen::Vector3f offset_cm =
+        (skeleton.joints[b].offset_m / axis::kCentimetre_m).cast<float>();
+    entry.offset_cm[b] = {offset_cm.x(), offset_cm.y(), offset_cm.z()};
+  }
+  const auto avatar = axis::skeleton_of(entry, kOrder);
+  if (!avatar) return nullptr;
+  for (std::size_t b = 0; b < axis::kBones; ++b) {
+    const Joint& joint = (*avatar)->joints[b];
+    if (joint.parent != skeleton.joints[b].parent ||
+        joint.T_world_joint.angularDistance(skeleton.joints[b].T_world_joint) > kSame_rad) {
+      return nullptr;
+    }
+  }
+  return *avatar;
 }
 
 }  // namespace
@@ -38,6 +62,9 @@ Result<AxisFigure> AxisFigure::make(std::shared_ptr<const Skeleton> skeleton, st
                                     std::string_view name) {
   axis::AvatarEntry entry;
   entry.avatar = axis::make_avatar(number, name);
+  axis::AvatarEntry own = entry;
+  const auto avatar = skeleton != nullptr ? own_avatar(*skeleton, own) : nullptr;
+  if (avatar != nullptr) entry = own;
   const axis::Proportions average_cm = entry.offset_cm;
   const auto figure = [&](double scale) {
     for (std::size_t bone = 0; bone < average_cm.size(); ++bone) {
@@ -47,7 +74,8 @@ Result<AxisFigure> AxisFigure::make(std::shared_ptr<const Skeleton> skeleton, st
     }
     return axis::skeleton_of(entry, kOrder);
   };
-  auto fit = TRY(Fit::make(std::move(skeleton), /*own=*/false, figure));
+  auto fit =
+      TRY(Fit::make(avatar != nullptr ? avatar : std::move(skeleton), avatar != nullptr, figure));
   AxisFigure made(std::move(fit), entry.offset_cm);
   made.message_.avatar = entry.avatar;
   made.message_.content.displacement = true;
@@ -106,7 +134,7 @@ Result<std::unique_ptr<Output>> AxisOutput::open(const config::OutputConfig& con
     return std::make_unique<AxisOutput>(config, std::move(wake), std::nullopt,
                                         std::move(receivers));
   }
-  auto clients = TRY(LineClients::open(config.listen, config.peers));
+  auto clients = TRY(LineClients::open(config.listen, config.peers, config.people()));
   return std::make_unique<AxisOutput>(config, std::move(wake), std::move(clients), std::nullopt);
 }
 
@@ -128,7 +156,7 @@ Result<> AxisOutput::set_stream(std::size_t place, const LiveStream* stream) {
   if (stream == nullptr) return {};
   // A blank ends the name in a line of text.
   const auto& skeleton = stream->skeleton;
-  const bool keeps_name = skeleton != nullptr && is_axis_avatar(*skeleton) &&
+  const bool keeps_name = skeleton != nullptr && figure_of(*skeleton) &&
                           (binary_ || skeleton->name.find(' ') == std::string::npos);
   const std::string name =
       distinct_name(keeps_name ? skeleton->name : stream->name, stream->name, place, names_);

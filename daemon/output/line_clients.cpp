@@ -15,7 +15,7 @@ namespace {
 constexpr int kWaiting = 16;    // connections that the kernel keeps until they are let in
 constexpr int kMaxAtOnce = 16;  // that are let in or refused in one look
 // A few lines: what the kernel keeps for a client that does not read is old when it does.
-constexpr int kLineBuffer = 16 * 1024;  // bytes
+constexpr int kLineBuffer = 16 * 1024;  // bytes of each person; more would be old when it is read
 constexpr std::int64_t kPatience_ns = 2 * kNanosPerSecond;
 
 // Whether the other side has closed the connection; discards what it has sent.
@@ -27,13 +27,15 @@ bool has_closed(int fd) noexcept {
 
 }  // namespace
 
-Result<LineClients> LineClients::open(const std::string& listen, std::vector<std::string> peers) {
+Result<LineClients> LineClients::open(const std::string& listen, std::vector<std::string> peers,
+                                      std::size_t people) {
   const auto address = TRY(drivers::listen_address(listen, peers, "the clients'"));
   auto allowed = TRY(drivers::Peers::parse(peers));
   const auto fd = TRY(drivers::listen_on(address, listen, kWaiting));
   LineClients clients;
   clients.listener_ = fd;
   clients.peers_ = std::move(allowed);
+  clients.buffer_bytes_ = static_cast<int>(people) * kLineBuffer;
   drivers::Address bound;
   ::getsockname(fd, bound.get(), &bound.size);
   clients.endpoint_ = drivers::endpoint_text(bound);
@@ -45,6 +47,7 @@ LineClients::LineClients(LineClients&& other) noexcept
       endpoint_(std::move(other.endpoint_)),
       greeting_(std::move(other.greeting_)),
       peers_(std::move(other.peers_)),
+      buffer_bytes_(other.buffer_bytes_),
       clients_(std::exchange(other.clients_, {})),
       reported_ns_(other.reported_ns_) {}
 
@@ -118,7 +121,7 @@ void LineClients::let_in(std::int64_t now_ns, std::vector<News>& news) {
              now_ns, news);
     } else {
       drivers::keep_alive(fd);
-      ::setsockopt(fd, SOL_SOCKET, SO_SNDBUF, &kLineBuffer, sizeof kLineBuffer);
+      ::setsockopt(fd, SOL_SOCKET, SO_SNDBUF, &buffer_bytes_, sizeof buffer_bytes_);
       clients_.push_back({.fd = fd, .from = drivers::endpoint_text(peer)});
     }
   }

@@ -21,8 +21,10 @@ class LineClients {
   static constexpr std::size_t kMaxClients = 16;
 
   // Listens on an address such as "127.0.0.1:7002"; for port 0 the system chooses one. Beyond
-  // loopback `peers` must name the addresses that may connect. Cold.
-  static Result<LineClients> open(const std::string& listen, std::vector<std::string> peers);
+  // loopback `peers` must name the addresses that may connect. `people`: of whom lines go out
+  // together. Cold.
+  static Result<LineClients> open(const std::string& listen, std::vector<std::string> peers,
+                                  std::size_t people = 1);
   ~LineClients();
   LineClients(LineClients&& other) noexcept;
   LineClients& operator=(LineClients&&) = delete;
@@ -67,6 +69,7 @@ class LineClients {
   int listener_ = -1;
   std::string endpoint_, greeting_;
   drivers::Peers peers_;
+  int buffer_bytes_ = 0;  // of a client's socket
   std::vector<Client> clients_;
   std::int64_t reported_ns_ = kNoTime_ns;  // when look() last told of a refusal
 };

@@ -2,6 +2,7 @@
 #include "daemon/output/axis_output.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 #include <optional>
 #include <span>
@@ -16,6 +17,7 @@
 #include "models/motion/retarget.hpp"
 #include "models/motion/synthetic_walker.hpp"
 #include "proto/clip/format.hpp"
+#include "proto/frame/degree.hpp"
 #include "proto/frame/rotation.hpp"
 #include "tests/support/raw_peer.hpp"
 #include "tests/support/shared.hpp"
@@ -360,6 +362,58 @@ TEST_CASE("an avatar of Axis Neuron keeps its name, unless a blank would end it"
     rig.pass(frame_of(0, frame), rig.now_ns);
     CHECK(next_lines(peer).starts_with("0 " + std::string(sent) + " "));
   }
+}
+
+TEST_CASE("an avatar of Axis Neuron keeps the turns and lengths of all its bones") {
+  namespace axis = drivers::axis;
+  axis::AvatarEntry entry;
+  entry.measured = true;
+  entry.avatar = axis::make_avatar(3, "ann");
+  for (auto& offset_cm : entry.offset_cm) {
+    for (float& x_cm : offset_cm) x_cm *= 1.07F;
+  }
+  // YXZ and ZXY, as the application is set.
+  const auto order = GENERATE(std::uint8_t{0}, std::uint8_t{4});
+  const auto skeleton = axis::skeleton_of(entry, order).value();
+  Frame frame = frame_of(0, Frame{});
+  for (std::size_t b = 0; b < axis::kBones; ++b) {
+    const auto at = static_cast<double>(b);
+    const Eigen::Vector3d about =
+        Eigen::Vector3d(std::sin(at), std::cos(3 * at), std::sin(2 * at) + 0.1).normalized();
+    frame.rotation_xyzw[b] =
+        from_eigen(Eigen::Quaterniond(Eigen::AngleAxisd(0.2 + 0.01 * at, about)));
+    frame.valid.set(b);
+  }
+  auto figure = AxisFigure::make(skeleton, 0, "ann").value();
+  const std::string_view bytes = figure.message(frame);
+  axis::Message message;
+  REQUIRE(axis::decode_binary(std::as_bytes(std::span(bytes)), message) == Outcome::kOk);
+  for (std::size_t b = 0; b < axis::kBones; ++b) {
+    const double* values = &message.values[axis::rotations_at(message.content, b)];
+    const Eigen::Quaterniond turn =
+        Eigen::AngleAxisd(values[0] * kDegree, Eigen::Vector3d::UnitY()) *
+        Eigen::AngleAxisd(values[1] * kDegree, Eigen::Vector3d::UnitX()) *
+        Eigen::AngleAxisd(values[2] * kDegree, Eigen::Vector3d::UnitZ());
+    CHECK(angle_between_rad(turn, to_eigen_double(frame.rotation_xyzw[b])) < 1e-6);
+    for (std::size_t k = 0; k < 3 && b > 0; ++k) {
+      CHECK(std::abs((values - 3)[k] - static_cast<double>(entry.offset_cm[b][k])) < 1e-5);
+    }
+  }
+}
+
+TEST_CASE("a client that reads a little later gets the lines of many people") {
+  constexpr std::size_t kPeople = 16;
+  LineClients clients = LineClients::open("127.0.0.1:0", {}, kPeople).value();
+  const test::RawPeer peer(clients.endpoint());
+  CHECK(clients.look(0).empty());
+  const std::string line = std::string(14'000, 'a') + "\n";  // as long as there are
+  for (std::size_t i = 0; i < kPeople; ++i) CHECK(clients.send(line, 1).sent == 1);
+  std::size_t got = 0;
+  for (int i = 0; i < 2000 && got < kPeople * line.size(); ++i) {
+    got += peer.receive(1 << 20, std::chrono::milliseconds(1)).size();
+    CHECK(clients.look(1).empty());
+  }
+  CHECK(got == kPeople * line.size());
 }
 
 TEST_CASE("only peers that the config names get lines") {
