@@ -502,17 +502,21 @@ int sided_by_fingers(const Figure& figure, const Motion& motion, const BoneJoint
   return std::abs(low) < kLow ? 0 : low > 0.0 ? 1 : -1;
 }
 
+void swap_all_sides(BoneJoints& bones) {
+  for (const auto& [first, count] : {std::pair{Bone::kLeftShoulder, 4},
+                                     {Bone::kLeftUpperLeg, 4},
+                                     {Bone::kLeftThumbMetacarpal, kFingerBones}}) {
+    bones.swap_sides(first, count);
+  }
+}
+
 bool turn_to_face(const Vec& facing, const Figure& figure, BoneJoints& bones) {
   const auto at = [&](Bone bone) { return figure.between(0, bones[bone]).value_or(Vec::Zero()); };
   const Vec left = at(Bone::kLeftUpperLeg) - at(Bone::kRightUpperLeg);
   const Vec up = at(Bone::kLeftUpperArm) + at(Bone::kRightUpperArm) - at(Bone::kLeftLowerLeg) -
                  at(Bone::kRightLowerLeg);
   if (left.cross(up).dot(facing) >= 0.0) return false;
-  for (const auto& [first, count] : {std::pair{Bone::kLeftShoulder, 4},
-                                     {Bone::kLeftUpperLeg, 4},
-                                     {Bone::kLeftThumbMetacarpal, kFingerBones}}) {
-    bones.swap_sides(first, count);
-  }
+  swap_all_sides(bones);
   return true;
 }
 

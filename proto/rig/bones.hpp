@@ -43,7 +43,7 @@ enum class Kind : std::uint8_t {
 };
 
 // What says which side of a person is left, or which hand it is.
-enum class SidesBy : std::uint8_t { kNames, kFeet, kNothing };
+enum class SidesBy : std::uint8_t { kNames, kFeet, kBends, kNothing };
 
 struct FoundBones {
   Kind kind = Kind::kPart;
@@ -62,6 +62,8 @@ struct FoundBones {
 // hand's, or the thumb lies below such a palm, -1 for a right one's, 0 when they do not tell.
 [[nodiscard]] int sided_by_fingers(const Figure& figure, const Motion& motion,
                                    const BoneJoints& bones);
+
+void swap_all_sides(BoneJoints& bones);
 
 // Swaps the sides of a person whose zero pose, by them, does not face `facing`. Returns whether it
 // did.

@@ -49,22 +49,28 @@ void Frames::legs() {
   }
 }
 
-// Feet that both point aside say where forward is in the legs' own frames.
+// Feet that both point aside say where forward is in the legs' own frames. Tips alone do not: an
+// end site may be anywhere.
 bool Frames::legs_by_feet(const Both& thigh) {
   const Mat Th = *t_frame(Bone::kHips);
   const auto toes = std::array{toe_way(Side::kLeft), toe_way(Side::kRight)};
   if (!toes[0] || !toes[1]) return false;
-  std::array<double, 2> aside_deg{};
-  for (const Side side : kSides) {
-    const Vec way = Th * *toes[at(side)];
-    aside_deg[at(side)] = std::atan2(way.x(), way.z()) / kDegree;
-  }
-  const double most = std::max(std::abs(aside_deg[0]), std::abs(aside_deg[1]));
-  if (most <= 75 && std::abs(aside_deg[0] + aside_deg[1]) <= 60) return false;
+  const auto aside_deg = [&Th](const Vec& way) {
+    return std::atan2((Th * way).x(), (Th * way).z()) / kDegree;
+  };
+  const auto point_aside = [&](const Both& ways) {
+    const double left_deg = aside_deg(ways[0]);
+    const double right_deg = aside_deg(ways[1]);
+    return std::max(std::abs(left_deg), std::abs(right_deg)) > 75 ||
+           std::abs(left_deg + right_deg) > 60;
+  };
+  const Both to_joints{*off(Bone::kLeftFoot, Bone::kLeftToes),
+                       *off(Bone::kRightFoot, Bone::kRightToes)};
+  if (!point_aside({*toes[0], *toes[1]}) || !point_aside(to_joints)) return false;
   for (const Side side : kSides) {
     const std::string why = "the foot gives forward";
     leg(side, frame(thigh[at(side)], -kY, *toes[at(side)], kZ), 0.9, why);
-    real_foot(side, sure(on(side, Bone::kLeftLowerLeg)), why, true);
+    real_foot(side, sure(on(side, Bone::kLeftLowerLeg)), "zero pose, as " + why, true);
   }
   return true;
 }

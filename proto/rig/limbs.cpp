@@ -35,8 +35,14 @@ void extend(Choices& choices, const Fit& fit, int joint, int rank,
 }
 
 // Of two joints that are called alike, a limb goes on in the one with more below it, or else in the
-// farther one; the other helps the skin there.
-bool leads_on(const Figure& figure, int joint, int before) {
+// farther one; the other helps the skin there. Where toes are told apart, the first counts.
+bool leads_on(const Figure& figure, const std::vector<JointName>& names, int joint, int before,
+              bool is_end) {
+  const bool counted = names[joint].stem == names[before].stem && !names[joint].digits.empty() &&
+                       !names[before].digits.empty();
+  if (is_end && counted && figure[joint].parent == figure[before].parent) {
+    return names[joint].digits < names[before].digits;
+  }
   const int more = figure.main_chain_length(joint) - figure.main_chain_length(before);
   if (more != 0 || figure[joint].parent != figure[before].parent) return more > 0;
   return figure[joint].offset.norm() > 1.01 * figure[before].offset.norm();
@@ -57,7 +63,7 @@ std::vector<bool> copies_in(const std::vector<JointName>& names) {
   return out;
 }
 
-std::array<int, kSlots> best_chain(const Figure& figure,
+std::array<int, kSlots> best_chain(const Figure& figure, const std::vector<JointName>& names,
                                    const std::vector<std::optional<Fit>>& fits,
                                    const std::array<bool, kSlots>& needed) {
   std::vector<Choices> at(fits.size());
@@ -74,7 +80,9 @@ std::array<int, kSlots> best_chain(const Figure& figure,
     extend(at[j], *fits[j], j, figure.depth(j) - 1, needed);
     const Choice& top = best_of(at[j]);
     const double more = top.value - best.value;
-    if (more < -1e-9 || (more <= 1e-9 && (last < 0 || !leads_on(figure, j, last)))) continue;
+    const bool is_end = top.joint.back() == j;
+    if (more < -1e-9) continue;
+    if (more <= 1e-9 && (last < 0 || !leads_on(figure, names, j, last, is_end))) continue;
     best = top;
     last = j;
   }
@@ -237,7 +245,7 @@ void find_limbs(const Figure& figure, const std::vector<JointName>& names, BoneJ
     }
     const std::size_t end = first == Bone::kLeftUpperLeg ? 2 : 3;  // foot or hand
     drop_marks(figure, end, fits);
-    auto chain = best_chain(figure, fits, needed);
+    auto chain = best_chain(figure, names, fits, needed);
     settle_pieces(figure, names, first == Bone::kLeftUpperLeg ? 0 : 1, leg, chain);
     if (chain[end - 1] >= 0 && chain[end] < 0) {
       chain[end] = next_of_limb(figure, names, chain[end - 1], end == 2 ? chain[3] : -1);

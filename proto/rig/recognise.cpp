@@ -22,7 +22,8 @@ struct LengthUnit {
 constexpr double kInch_m = 0.0254;
 constexpr double kCmu_m = kInch_m / 0.45;
 constexpr double kMmd_m = 0.08;
-constexpr double kNever = 1e9;  // unless its maker's names say so: decimetres are too near
+constexpr double kPoser_m = 2.4384;
+constexpr double kNever = 1e9;  // unless its maker's names say so: a usual unit is too near
 constexpr double kHundred = 100.0;
 constexpr std::array<LengthUnit, 10> kLengthUnits{
     {{1.0, "metres", 0.0},
@@ -32,7 +33,7 @@ constexpr std::array<LengthUnit, 10> kLengthUnits{
      {0.1, "decimetres", 0.3},
      {0.3048, "feet", 0.35},
      {kCmu_m, "inches / 0.45", 0.6},
-     {2.4384, "Poser's units of 8 feet", 0.6},
+     {kPoser_m, "Poser's units of 8 feet", kNever},
      {kMmd_m, "MikuMikuDance's units of 8 cm", kNever},
      {kHundred, "metres that the file calls centimetres", kNever}}};
 
@@ -47,7 +48,11 @@ double usual_unit_m(const std::vector<RigJoint>& joints, const std::vector<Joint
         joints, [part](const RigJoint& joint) { return lower(joint.name).contains(part); });
   };
   const bool is_mmd = (any_name("upperbody") && any_name("lowerbody")) || any_joint("センター");
-  return is_mmd ? kMmd_m : any_joint("hipjoint") ? kCmu_m : any_joint("valvebiped") ? kInch_m : 0.0;
+  return is_mmd                    ? kMmd_m
+         : any_joint("hipjoint")   ? kCmu_m
+         : any_joint("valvebiped") ? kInch_m
+         : any_joint("shldr")      ? kPoser_m
+                                   : 0.0;
 }
 
 const LengthUnit& unit_for(double length, double true_m, double usual_m) {
@@ -151,8 +156,17 @@ void collect(const RigInput& input, const Frames& frames, Rig& rig) {
   }
 }
 
-// What is known of a finger is no surer than which finger it is.
-void doubt_places(const FoundBones& found, Rig& rig) {
+// Nothing is sure of a person who may as well face the other way, and what is known of a finger is
+// no surer than which finger it is.
+void doubt_places(const FoundBones& found, const RigInput& input, Rig& rig) {
+  constexpr double kGuess = 0.4;
+  if (found.kind == Kind::kPerson && found.sides_by == SidesBy::kNothing && !input.facing) {
+    for (std::size_t j = 0; j < rig.bone.size(); ++j) {
+      Evidence& evidence = rig.evidence[j];
+      if (!rig.bone[j] || evidence.sure <= kGuess) continue;
+      evidence = {.sure = kGuess, .why = "where it faces is a guess; " + evidence.why};
+    }
+  }
   constexpr double kByPlace = 0.7;
   for (std::size_t j = 0; j < rig.bone.size(); ++j) {
     if (!rig.bone[j] || *rig.bone[j] < Bone::kLeftThumbMetacarpal) continue;
@@ -163,8 +177,21 @@ void doubt_places(const FoundBones& found, Rig& rig) {
   }
 }
 
-// Which side of the person is left, and so where it faces: by the caller's word, the names or the
-// feet.
+// Knees and elbows bend one way: where neither names nor feet say which side of a person is left,
+// they do.
+void side_by_bends(const Figure& figure, const std::vector<JointName>& names, const Motion& motion,
+                   FoundBones& found) {
+  std::vector<std::string> notes;  // of an attempt, which nobody reads
+  Frames frames(figure, names, found.joint, motion, notes);
+  if (!frames.can_find_person()) return;
+  frames.find_person();
+  const int ahead = frames.bends_ahead();
+  if (ahead < 0) swap_all_sides(found.joint);
+  if (ahead != 0) found.sides_by = SidesBy::kBends;
+}
+
+// Which side of the person is left, and so where it faces: by the caller's word, the names, the
+// feet or how it bends.
 void settle_facing(const RigInput& input, const Figure& figure, FoundBones& found, Rig& rig) {
   const bool by_profile = !input.bones.empty();
   if (input.facing && !by_profile) {
@@ -176,6 +203,9 @@ void settle_facing(const RigInput& input, const Figure& figure, FoundBones& foun
   } else if (found.sides_by == SidesBy::kFeet) {
     found.notes.emplace_back(
         "bones are known by shape only; left and right by the direction of the feet");
+  } else if (found.sides_by == SidesBy::kBends) {
+    found.notes.emplace_back(
+        "bones are known by shape only; left and right by how knees and elbows bend in the clip");
   } else if (found.sides_by == SidesBy::kNothing) {
     found.notes.emplace_back(
         "which side is left is not known: neither the names nor the feet say it; say which axis "
@@ -185,6 +215,7 @@ void settle_facing(const RigInput& input, const Figure& figure, FoundBones& foun
                    : input.facing                      ? "as you say"
                    : found.sides_by == SidesBy::kNames ? "by the names of left and right"
                    : found.sides_by == SidesBy::kFeet  ? "by the feet"
+                   : found.sides_by == SidesBy::kBends ? "by how knees and elbows bend"
                                                        : "a guess";
 }
 
@@ -244,6 +275,8 @@ Rig recognise_found(const RigInput& input, const Figure& figure,
     settle_hand(figure, motion, found);
   }
   rig.kind = found.kind;
+  const bool is_asked = found.sides_by == SidesBy::kNothing && !input.facing;
+  if (found.kind == Kind::kPerson && is_asked) side_by_bends(figure, names, motion, found);
   if (found.kind == Kind::kPerson) settle_facing(input, figure, found, rig);
   rig.bone = found.joint.by_joint(figure.size());
   std::vector<std::string> notes = found.notes;
@@ -274,7 +307,7 @@ Rig recognise_found(const RigInput& input, const Figure& figure,
     rig.notes.insert(rig.notes.begin(), notes.begin(), notes.end());
   }
   collect(input, frames, rig);
-  doubt_places(found, rig);
+  doubt_places(found, input, rig);
   return rig;
 }
 

@@ -110,22 +110,47 @@ double Frames::leg_length() const {
   return thigh_length + (shin ? shin->norm() : thigh_length);
 }
 
+// How far the axis about which the limb of a left `upper` bone clearly bends is from a person's.
+std::optional<double> Frames::bends_off_deg(Bone upper, Side side) const {
+  const auto after = [&](int i) {
+    return on(side, static_cast<Bone>(static_cast<int>(upper) + i));
+  };
+  if (!joint_.has(after(2))) return std::nullopt;
+  const Bend bent = bend(after(0), after(1), after(2));
+  if (bent.flex_deg <= 20 || bent.agree <= 0.7) return std::nullopt;
+  const Vec of_arm = side == Side::kLeft ? Vec(-kY) : kY;
+  return angle_deg(*t_frame(after(0)) * bent.axis, upper == Bone::kLeftUpperLeg ? kX : of_arm);
+}
+
+int Frames::bends_ahead() const {
+  constexpr double kClear_deg = 60;
+  int ahead = 0;
+  int behind = 0;
+  for (const Side side : kSides) {
+    for (const Bone upper : {Bone::kLeftUpperLeg, Bone::kLeftUpperArm}) {
+      const auto off_deg = bends_off_deg(upper, side);
+      const bool folded = sure(on(side, upper)) < 1.0;  // its axis was chosen by how it bends
+      if (!off_deg || folded) continue;
+      ahead += *off_deg < kClear_deg ? 1 : 0;
+      behind += *off_deg > 180 - kClear_deg ? 1 : 0;
+    }
+  }
+  if (ahead > 1 && behind == 0) return 1;
+  return behind > 1 && ahead == 0 ? -1 : 0;
+}
+
 // The limbs of a person bend one way: a clear bend about another axis means that the zero pose is
 // not what it seems. It never changes T.
 void Frames::check_hinges() {
-  const auto check = [this](Bone upper, Bone lower, Bone end, const Vec& to) {
-    if (!joint_.has(end)) return;
-    const Bend bent = bend(upper, lower, end);
-    const double off_deg = angle_deg(*t_frame(upper) * bent.axis, to);
-    if (bent.flex_deg <= 20 || bent.agree <= 0.7 || off_deg <= 60) return;
-    notes_.push_back(std::string(bone_name(lower)) + " bends about an axis " +
-                     short_text(off_deg, 0) + " degrees from a person's: is its zero pose right?");
-  };
   for (const Side side : kSides) {
-    check(on(side, Bone::kLeftUpperLeg), on(side, Bone::kLeftLowerLeg), on(side, Bone::kLeftFoot),
-          kX);
-    check(on(side, Bone::kLeftUpperArm), on(side, Bone::kLeftLowerArm), on(side, Bone::kLeftHand),
-          side == Side::kLeft ? Vec(-kY) : kY);
+    for (const Bone upper : {Bone::kLeftUpperLeg, Bone::kLeftUpperArm}) {
+      const auto off_deg = bends_off_deg(upper, side);
+      if (!off_deg || *off_deg <= 60) continue;
+      const auto lower = static_cast<Bone>(static_cast<int>(upper) + 1);
+      notes_.push_back(std::string(bone_name(on(side, lower))) + " bends about an axis " +
+                       short_text(*off_deg, 0) +
+                       " degrees from a person's: is its zero pose right?");
+    }
   }
   const Vec pelvis = t_frame(Bone::kHips)->transpose() * kY;
   std::vector<double> lean_deg;

@@ -47,6 +47,10 @@ class Frames {
   void lay_parts();  // for an incomplete figure: from a zero pose near the T-pose
   [[nodiscard]] bool can_find_person() const;
 
+  // After find_person: +1 where knees and elbows clearly bend as a person's do, -1 where they all
+  // do as of one who faces the other way, 0 else and where the zero pose is folded.
+  [[nodiscard]] int bends_ahead() const;
+
   [[nodiscard]] const std::optional<Mat>& t_frame(Bone bone) const { return T_[index(bone)]; }
   [[nodiscard]] const Evidence& evidence(Bone bone) const { return evidence_[index(bone)]; }
   [[nodiscard]] UpAxis up() const { return up_; }
@@ -116,6 +120,7 @@ class Frames {
   [[nodiscard]] std::optional<Vec> palm(Side side) const;
   void arm(Side side, const Mat& T, double sure, const std::string& why, bool folded);
   void fingers(Side side);
+  [[nodiscard]] std::optional<double> bends_off_deg(Bone upper, Side side) const;
   void check_hinges();
   void lay(Bone bone, const Mat& T_parent);
 

@@ -302,6 +302,38 @@ TEST_CASE("rig: the unit of MikuMikuDance's figures is 8 cm") {
   CHECK(rig::recognise(made.input).metres_per_unit == Approx(0.08));
 }
 
+TEST_CASE("rig: Poser's unit is for Poser's names: others' short legs are a child's in metres") {
+  const auto unit_of = [](std::size_t scheme, double metres_per_unit, double height) {
+    auto made = test::make(test::kSchemes[scheme], ZeroPose::kT, Mat::Identity(), metres_per_unit,
+                           0, 1, {.height = height, .axes = {}});
+    made.input.poses = {};
+    return rig::recognise(made.input).metres_per_unit;
+  };
+  CHECK(unit_of(3, 1.0, 0.45) == Approx(1.0));
+  CHECK(unit_of(2, 2.4384, 1.0) == Approx(2.4384));  // "lShldr"
+}
+
+TEST_CASE("rig: end sites of toes that point aside turn no leg") {
+  auto made = test::make(test::kSchemes[0], ZeroPose::kT, Mat::Identity(), 0.01);
+  for (const Bone toes : {Bone::kLeftToes, Bone::kRightToes}) {
+    made.input.joints[static_cast<std::size_t>(toes)].end_site = Vec(30, 0, 0);
+  }
+  CHECK(worst_deg(rig::recognise(made.input), made) < 1.0);
+}
+
+TEST_CASE("rig: of toes that are counted the first is the toes") {
+  auto made = test::make(test::kSchemes[0], ZeroPose::kT, Mat::Identity(), 0.01);
+  made.input.poses = {};
+  const auto toes = static_cast<std::size_t>(Bone::kLeftToes);
+  auto& joints = made.input.joints;
+  joints[toes].name = "mixamorig:LeftToe5_1";
+  add_joints(made, {{.name = "mixamorig:LeftToe1_1",
+                     .parent = static_cast<int>(Bone::kLeftFoot),
+                     .offset = 0.9 * joints[toes].offset,
+                     .end_site = {}}});
+  CHECK(rig::recognise(made.input).bone[test::kMakerJoints] == Bone::kLeftToes);
+}
+
 TEST_CASE("rig: a joint called the head of a neck is the head, though two necks are below it") {
   auto made = test::make(test::kSchemes.back(), ZeroPose::kT, Mat::Identity(), 0.01);
   made.input.poses = {};
@@ -755,13 +787,46 @@ TEST_CASE("rig: without names the shape tells the limbs, and the feet which side
   }));
 }
 
-TEST_CASE("rig: where neither names nor feet say which side is left, the axis that it faces does") {
+// A person of whom neither names nor feet say which side is left.
+test::Made faceless() {
   auto made = test::make(test::kSchemes[0], ZeroPose::kA, Mat::Identity(), 0.01);
   auto& joints = made.input.joints;
   for (std::size_t j = 0; j < joints.size(); ++j) joints[j].name = "J" + std::to_string(j);
   for (const Bone bone : {Bone::kLeftToes, Bone::kRightToes}) {
-    joints[static_cast<std::size_t>(bone)].offset = {0, -1, 0};
+    joints[static_cast<std::size_t>(bone)].offset = Vec::Zero();
   }
+  return made;
+}
+
+// The same person in a mirror, whose right limbs come first in the file.
+void mirror(test::Made& made) {
+  const auto flip = [](Vec& v) { v.x() = -v.x(); };
+  for (auto& joint : made.input.joints) {
+    flip(joint.offset);
+    if (joint.end_site) flip(*joint.end_site);
+  }
+  for (Vec& position : made.input.poses.position) flip(position);
+  for (auto& q : made.input.poses.rotation) q = {q.w(), q.x(), -q.y(), -q.z()};
+}
+
+TEST_CASE("rig: where neither names nor feet say which side is left, knees and elbows do") {
+  for (const bool mirrored : {false, true}) {
+    auto made = faceless();
+    if (mirrored) mirror(made);
+    const rig::Rig rig = rig::recognise(made.input);
+    INFO((mirrored ? "mirrored" : "as made"));
+    CHECK(rig.facing == "+z");
+    const auto arm = static_cast<std::size_t>(Bone::kLeftUpperArm);
+    CHECK(rig.bone[arm] == (mirrored ? Bone::kRightUpperArm : Bone::kLeftUpperArm));
+    CHECK(rig.evidence[arm].sure > 0.8);
+    made.input.poses = {};
+    CHECK(rig::recognise(made.input).evidence[arm].sure < 0.5);
+  }
+}
+
+TEST_CASE("rig: where neither names, feet nor bends say which side is left, the facing axis does") {
+  auto made = faceless();
+  made.input.poses = {};
   const auto asks = [](const rig::Rig& rig) {
     return std::ranges::any_of(rig.notes, [](const std::string& note) {
       return note.find("facing") != std::string::npos;
