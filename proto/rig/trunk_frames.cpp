@@ -292,7 +292,7 @@ void Frames::find_up() {
   // What the root says of a zero pose without a frame of its own gives way to the usual axis only.
   const auto expected = [&] {
     if (is_profile) return false;
-    if (zero != nullptr) return best_up == kZ;
+    if (zero != nullptr) return best_up == kZ && stays_above;
     return stays_above && (!root_says || best.up == root_up || best.up == UpAxis::kPlusY);
   };
   const bool stands = best.stand > 0.9 && best.above > 0.9 && (expected() || walks(best_up));

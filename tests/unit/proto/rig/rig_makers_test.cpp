@@ -313,6 +313,16 @@ TEST_CASE("rig: Poser's unit is for Poser's names: others' short legs are a chil
   CHECK(unit_of(2, 2.4384, 1.0) == Approx(2.4384));  // "lShldr"
 }
 
+TEST_CASE("rig: who lies along z in a clip of y up has no floor across z, and is not stood up") {
+  auto made = test::make(test::kSchemes[0], ZeroPose::kT, Mat::Identity(), 0.01, 0, 1);
+  auto& poses = made.input.poses;
+  poses.rotation[0] = Eigen::AngleAxisd(85 * kDegree, rig::kX);
+  poses.position[0] = Vec(0, 40, 0);
+  CHECK(rig::recognise(made.input).up == UpAxis::kPlusY);
+  poses.position[0] = Vec(0, 40, 90);  // nor is one who stands in a file of z up laid down
+  CHECK(rig::recognise(made.input).up == UpAxis::kPlusZ);
+}
+
 TEST_CASE("rig: end sites of toes that point aside turn no leg") {
   auto made = test::make(test::kSchemes[0], ZeroPose::kT, Mat::Identity(), 0.01);
   for (const Bone toes : {Bone::kLeftToes, Bone::kRightToes}) {
