@@ -90,14 +90,37 @@ void BoneTurns::match_trunk(const std::vector<std::pair<double, int>>& taught) {
   if (taught.size() < 2 || place(head) < 0.0) return;
   // What lies between the neck and the head rides on the neck.
   int j = place(neck) >= 0.0 ? neck : skeleton_.joints[static_cast<std::size_t>(head)].parent;
-  for (double to = 1.0; j != hips; j = skeleton_.joints[static_cast<std::size_t>(j)].parent) {
+  std::vector<std::pair<int, double>> beyond;  // what the neck turns more than by its place
+  double to = 1.0;
+  for (; j != hips; j = skeleton_.joints[static_cast<std::size_t>(j)].parent) {
     Part& part = parts_[static_cast<std::size_t>(j)];
-    const bool is_known_neck = j == neck && part.bone >= 0;
-    part.turns_as = between(taught, place(j), to, is_known_neck ? 1.0 - kNeckByName : 1.0);
-    if (is_known_neck) part.turns_as.emplace_back(part.bone, kNeckByName);
+    part.turns_as = between(taught, place(j), to, 1.0);
+    if (j == neck && part.bone >= 0) {
+      for (auto& [bone, share] : part.turns_as) {
+        share *= 1.0 - kNeckByName;
+        beyond.emplace_back(bone, -share);
+      }
+      part.turns_as.emplace_back(part.bone, kNeckByName);
+      beyond.emplace_back(part.bone, kNeckByName);
+    }
     if (part.bone < 0) part.bone = taught[1].second;
     part.rides = false;
     to = place(j);
+  }
+  keep_lean(beyond, place(neck), to);
+}
+
+// The bones between the hips and the neck give back what the neck turns `beyond` its place, over
+// their length, so that the head leans as far as the taught one.
+void BoneTurns::keep_lean(const std::vector<std::pair<int, double>>& beyond, double neck,
+                          double lowest) {
+  if (beyond.empty() || neck - lowest < 1.0 - neck) return;  // a neck longer than the trunk
+  const double back = (1.0 - neck) / (neck - lowest);
+  int j = skeleton_.joints[static_cast<std::size_t>(skeleton_.joint_of(Bone::kNeck))].parent;
+  for (; j != skeleton_.joint_of(Bone::kHips);
+       j = skeleton_.joints[static_cast<std::size_t>(j)].parent) {
+    auto& turns_as = parts_[static_cast<std::size_t>(j)].turns_as;
+    for (const auto& [bone, share] : beyond) turns_as.emplace_back(bone, -back * share);
   }
 }
 

@@ -58,6 +58,7 @@ class BoneTurns {
 
   BoneTurns() = default;
   void match_trunk(const std::vector<std::pair<double, int>>& taught);
+  void keep_lean(const std::vector<std::pair<int, double>>& beyond, double neck, double lowest);
   RT_SAFE void find_taught(std::span<const float> from, std::span<const float> change,
                            Turns& before, Turns& after) const noexcept;
   RT_SAFE [[nodiscard]] Eigen::Quaterniond turn_of(const Part& part, const Eigen::Quaterniond& own,

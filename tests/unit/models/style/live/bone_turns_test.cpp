@@ -4,6 +4,7 @@
 
 #include <catch2/catch.hpp>
 
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -149,4 +150,34 @@ TEST_CASE("a trunk that is divided elsewhere turns as what of the taught one lie
   CHECK(turned_rad(Bone::kSpine) < 1e-5);
   CHECK(turned_rad(Bone::kChest) == Approx(0.4).margin(1e-3));
   CHECK(turned_rad(Bone::kHead) == Approx(0.4).margin(1e-3));
+}
+
+TEST_CASE("a longer neck that turns as the taught one does not lean the head further",
+          "[style][bone_turns]") {
+  Build build;
+  const Skeleton& skeleton = *build.walk.skeleton;
+  const auto places = style::trunk_places(skeleton);
+  const double neck = places[static_cast<std::size_t>(skeleton.joint_of(Bone::kNeck))];
+  const double length = 0.5 * (1.0 - neck);  // of the taught neck, half the walker's
+  std::vector<double> taught;
+  for (const std::string& name : build.spec.joints) {
+    const Bone bone = *bone_from_name(name);
+    taught.push_back(bone == Bone::kNeck
+                         ? 1.0 - length
+                         : places[static_cast<std::size_t>(skeleton.joint_of(bone))]);
+  }
+  build.turns = style::BoneTurns::make(build.spec, taught, skeleton).value();
+  const Frame plain = build.walk.frame(20);
+  Frame styled = plain;
+  build.turns.add(styled, 0.4, build.vector_of(plain), build.change_of(Bone::kNeck, {0.4, 0, 0}),
+                  build.all);
+  const auto pitch_rad = [&](const Frame& frame, Bone from, Bone to) {
+    const Vector3d along = build.direction(frame, from, to);
+    return std::atan2(along.z(), along.y());
+  };
+  const auto bent_rad = [&](Bone from, Bone to) {
+    return pitch_rad(styled, from, to) - pitch_rad(plain, from, to);
+  };
+  CHECK(bent_rad(Bone::kNeck, Bone::kHead) > 0.25);
+  CHECK(bent_rad(Bone::kHips, Bone::kHead) == Approx(0.4 * length).margin(0.1 * length));
 }
