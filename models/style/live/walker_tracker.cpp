@@ -22,7 +22,7 @@ constexpr double kOwnNear_deg = 19.0, kOwnFar_deg = 23.5;   // from the walker's
 constexpr double kSame_deg = 7.0, kOther_deg = 9.5;         // either; so near at any pace
 constexpr double kStill_deg_s = 8.0, kMoving_deg_s = 16.0;  // PoseSpeed
 constexpr double kRest = 0.25, kSwing = 0.4;                // of the training's least swing
-constexpr double kTooSlow = 0.3, kSlow = 0.45;              // of the training's fastest cadence
+constexpr double kTooSlow = 0.2, kSlow = 0.3;               // of the training's fastest cadence
 constexpr double kFirstStep_rad =
     4.0;  // of a stride after rest, as the cadence lags by half a second
 constexpr double kFast = 1.2, kTooFast = 1.32;
@@ -163,9 +163,9 @@ RT_SAFE void Gate::see_legs(const TrainedMotion& known, const Frame& frame,
     cadence_rad_s_ -= std::expm1(-dt_s / kCadence_s) * (cadence_rad_s - cadence_rad_s_);
     steady_rad_s_ -= std::expm1(-dt_s / kSteady_s) * (cadence_rad_s_ - steady_rad_s_);
     const double ratio = cadence_rad_s_ / usual_rad_s;
-    // A first step begins slowly.
+    // A first step begins slowly, and slow legs turn fast and slowly within each.
     const bool begins = std::abs(stride_.angle_rad() - rest_rad_) < kFirstStep_rad;
-    const double of_slow = begins ? 1.0 : rise(ratio, kTooSlow, kSlow);
+    const double of_slow = begins ? 1.0 : rise(steady_rad_s_ / usual_rad_s, kTooSlow, kSlow);
     of_cadence_ = of_slow * (1.0 - of_run(known, ratio));
   }
   of_legs_ = (1.0 - rest) * of_cadence_;
