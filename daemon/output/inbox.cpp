@@ -6,33 +6,40 @@
 namespace posed::output {
 
 bool Delivery::put(std::size_t place, const Frame& frame) noexcept {
-  const bool full = count_ == frames_.size();
+  Queue& queue = queues_[place];
+  const bool full = queue.count == kDepth;
   if (full) {
-    first_ = (first_ + 1) % frames_.size();
-    --count_;
+    queue.first = (queue.first + 1) % kDepth;
+    --queue.count;
   }
-  Entry& entry = frames_[(first_ + count_) % frames_.size()];
-  entry.place = place;
+  Entry& entry = queue.entries[(queue.first + queue.count) % kDepth];
+  entry.number = ++number_;
   entry.frame = frame;
-  ++count_;
+  ++queue.count;
   return full;
 }
 
-void Delivery::swap_frames(Delivery& other) noexcept {
-  frames_.swap(other.frames_);
-  std::swap(first_, other.first_);
-  std::swap(count_, other.count_);
+void Delivery::clear() noexcept {
+  for (Queue& queue : queues_) queue.count = 0;
 }
 
+void Delivery::swap_frames(Delivery& other) noexcept { queues_.swap(other.queues_); }
+
 std::size_t Delivery::remove(std::size_t place) noexcept {
-  std::size_t kept = 0;
-  for (std::size_t i = 0; i < count_; ++i) {
-    const Entry& entry = frames_[(first_ + i) % frames_.size()];
-    if (entry.place == place) continue;
-    if (kept != i) frames_[(first_ + kept) % frames_.size()] = entry;
-    ++kept;
+  return std::exchange(queues_[place].count, 0);
+}
+
+std::optional<std::size_t> Delivery::oldest(const std::vector<std::size_t>& used) const noexcept {
+  std::optional<std::size_t> oldest;
+  std::uint64_t number = 0;
+  for (std::size_t place = 0; place < queues_.size(); ++place) {
+    if (used[place] == queues_[place].count) continue;
+    const std::uint64_t this_number = queues_[place].at(used[place]).number;
+    if (oldest && this_number > number) continue;
+    oldest = place;
+    number = this_number;
   }
-  return std::exchange(count_, kept) - kept;
+  return oldest;
 }
 
 bool Inbox::wants(std::string_view stream) const noexcept {
@@ -96,7 +103,7 @@ void Inbox::stream_leaves(std::uint32_t stream) noexcept {
 }
 
 void Inbox::drain(Delivery& into) {
-  into.count_ = 0;
+  into.clear();
   into.streams.assign(names_.size(), nullptr);  // freed, and allocated, before the lock
   into.samples.assign(names_.size(), std::nullopt);
   const std::scoped_lock lock(mutex_);

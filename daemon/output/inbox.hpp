@@ -36,11 +36,9 @@ using LiveStreams = std::vector<std::shared_ptr<const LiveStream>>;
 // The content of an inbox at one moment.
 class Delivery {
  public:
-  // Frames of each place, so that a crowd bridges as long a wait as one person.
-  static constexpr std::size_t kDepth = 16;
+  static constexpr std::size_t kDepth = 16;  // frames of a stream
 
-  explicit Delivery(std::size_t places)
-      : streams(places), samples(places), frames_(kDepth * places) {}
+  explicit Delivery(std::size_t places) : streams(places), samples(places), queues_(places) {}
 
   LiveStreams streams;
   std::vector<std::optional<Sample>> samples;  // [place] the newest
@@ -48,26 +46,40 @@ class Delivery {
   // Calls use(place, frame) for each frame, the oldest first.
   template <typename Use>
   void for_each(Use&& use) const {
-    for (std::size_t i = 0; i < count_; ++i) {
-      const Entry& entry = frames_[(first_ + i) % frames_.size()];
-      use(entry.place, entry.frame);
+    std::vector<std::size_t> used(queues_.size(), 0);
+    while (const auto place = oldest(used)) {
+      use(*place, queues_[*place].at(used[*place]).frame);
+      ++used[*place];
     }
   }
 
  private:
   friend class Inbox;
   struct Entry {
-    std::size_t place = 0;
+    std::uint64_t number = 0;  // of the frames of all streams, in their order
     Frame frame{};
   };
-  // Returns whether the oldest frame was replaced.
+  // The newest frames of one stream, so that none costs another its own.
+  struct Queue {
+    std::vector<Entry> entries = std::vector<Entry>(kDepth);
+    std::size_t first = 0, count = 0;
+
+    [[nodiscard]] const Entry& at(std::size_t i) const noexcept {
+      return entries[(first + i) % kDepth];
+    }
+  };
+  // Returns whether the stream's oldest frame was replaced.
   bool put(std::size_t place, const Frame& frame) noexcept;
+  void clear() noexcept;
   void swap_frames(Delivery& other) noexcept;
   // Removes the frames of a stream; returns how many there were.
   std::size_t remove(std::size_t place) noexcept;
+  // The place of the oldest frame, where the first `used` [place] ones do not count.
+  [[nodiscard]] std::optional<std::size_t> oldest(
+      const std::vector<std::size_t>& used) const noexcept;
 
-  std::vector<Entry> frames_;
-  std::size_t first_ = 0, count_ = 0;
+  std::vector<Queue> queues_;  // [place]
+  std::uint64_t number_ = 0;
 };
 
 class Inbox {

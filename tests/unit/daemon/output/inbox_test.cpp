@@ -103,17 +103,20 @@ TEST_CASE("an inbox takes the frames of the streams that its output names, in th
 
 TEST_CASE("a full inbox keeps the newest frames and counts the others") {
   InboxRig rig;
-  constexpr std::uint64_t kRoom = 3 * Delivery::kDepth;
   rig.inbox.stream_comes(info_of(3, "ann", nullptr));
   for (int round = 0; round < 3; ++round) {  // the ring begins at another place each time
-    for (std::uint64_t i = 1; i <= kRoom + 5; ++i) rig.inbox.frame(numbered(3, i));
+    for (std::uint64_t i = 1; i <= Delivery::kDepth + 5; ++i) rig.inbox.frame(numbered(3, i));
     std::string expected;
-    for (std::uint64_t i = 6; i <= kRoom + 5; ++i) {
+    for (std::uint64_t i = 6; i <= Delivery::kDepth + 5; ++i) {
       expected += "B" + std::to_string(i) + " ";
     }
     CHECK(rig.taken() == expected);
   }
   CHECK(rig.inbox.dropped() == 15);
+  rig.inbox.stream_comes(info_of(4, "glove", nullptr));
+  rig.inbox.frame(numbered(4, 1));
+  for (std::uint64_t i = 1; i <= 3 * Delivery::kDepth; ++i) rig.inbox.frame(numbered(3, i));
+  CHECK(rig.taken().find("R1 B33 ") == 0);  // another stream's frames stay
 }
 
 TEST_CASE("an inbox bridges a wait for each of many people as for one") {
