@@ -76,7 +76,8 @@ std::vector<OptionSpec> options() {
                "another"},
       {.name = "listen",
        .default_value = std::string("0.0.0.0:1511"),
-       .help = "address and port that the frames are sent to"},
+       .help = "address and port that the frames are sent to; a group's, until the server names "
+               "another port"},
       {.name = "command_listen",
        .default_value = std::string(),
        .help = "address and port for the server's answers; left out: any port"},

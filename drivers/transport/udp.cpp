@@ -1,5 +1,6 @@
 #include "drivers/transport/udp.hpp"
 
+#include <fcntl.h>
 #include <netinet/in.h>
 #include <sys/epoll.h>
 #include <sys/socket.h>
@@ -94,6 +95,17 @@ Result<Wanted> wanted_of(const UdpSocketSettings& socket, const UdpSettings& all
   return wanted;
 }
 
+// -1: see errno.
+int open_listener(const Address& address, bool shared) noexcept {
+  const int fd = bind_socket(address, SOCK_DGRAM, shared);
+  if (fd < 0) return fd;
+  const int yes = 1;
+  ::setsockopt(fd, SOL_SOCKET, SO_TIMESTAMPNS, &yes, sizeof yes);
+  ::setsockopt(fd, SOL_SOCKET, SO_RXQ_OVFL, &yes, sizeof yes);
+  ::setsockopt(fd, SOL_SOCKET, SO_RCVBUF, &kUdpBuffer_bytes, sizeof kUdpBuffer_bytes);
+  return fd;
+}
+
 }  // namespace
 
 struct UdpTransport::Batch {
@@ -141,6 +153,7 @@ Result<std::unique_ptr<UdpTransport>> UdpTransport::open(const UdpSettings& sett
   TRY(check_udp(settings));
   std::unique_ptr<UdpTransport> self(new UdpTransport());
   self->data_place_ = settings.data_place;
+  self->interface_ = settings.interface;
   self->peers_ = TRY(Peers::parse(settings.peers));
   self->epoll_ = ::epoll_create1(EPOLL_CLOEXEC);
   if (self->epoll_ < 0) {
@@ -158,20 +171,20 @@ Result<> UdpTransport::add(const UdpSocketSettings& settings, const UdpSettings&
   socket.to = wanted.to;
   socket.keeps_to = wanted.to.has_value();
   // Several programs may receive a group; a single address belongs to one.
-  socket.fd = bind_socket(wanted.listen, SOCK_DGRAM, wanted.group.has_value());
-  epoll_event event{};
-  event.events = EPOLLIN;
-  if (socket.fd < 0 || ::epoll_ctl(epoll_, EPOLL_CTL_ADD, socket.fd, &event) != 0) {
+  socket.fd = open_listener(wanted.listen, wanted.group.has_value());
+  if (socket.fd < 0 || !watch(socket.fd)) {
     return fail("cannot listen on " + settings.listen + " (" + errno_text() +
                 "); use an address of this machine and a port that is free");
   }
-  const int yes = 1;
-  ::setsockopt(socket.fd, SOL_SOCKET, SO_TIMESTAMPNS, &yes, sizeof yes);
-  ::setsockopt(socket.fd, SOL_SOCKET, SO_RXQ_OVFL, &yes, sizeof yes);
-  ::setsockopt(socket.fd, SOL_SOCKET, SO_RCVBUF, &kUdpBuffer_bytes, sizeof kUdpBuffer_bytes);
   if (!wanted.group) return {};
   socket.membership = TRY(Membership::join(socket.fd, *wanted.group, all.interface));
   return {};
+}
+
+bool UdpTransport::watch(int fd) const noexcept {
+  epoll_event event{};
+  event.events = EPOLLIN;
+  return ::epoll_ctl(epoll_, EPOLL_CTL_ADD, fd, &event) == 0;
 }
 
 std::string UdpTransport::endpoint(std::size_t socket) const {
@@ -204,7 +217,8 @@ RT_SAFE void UdpTransport::read_control(std::size_t i, Chunk& chunk) noexcept {
     chunk.arrival_ns = batch_ns_ - std::max<std::int64_t>(age_ns, 0);
   }
   if (const auto dropped = control_value<std::uint32_t>(header, SO_RXQ_OVFL)) {
-    chunk.kernel_dropped += *dropped - std::exchange(sockets_[socket_].dropped, *dropped);
+    const std::uint32_t before = std::exchange(sockets_[socket_].dropped, *dropped);
+    chunk.kernel_dropped += *dropped - (before <= *dropped ? before : 0);
   }
 }
 
@@ -229,23 +243,40 @@ void UdpTransport::upkeep(std::int64_t now_ns) noexcept {
   }
 }
 
+// Only groups: what goes to one address goes to where posed has asked for it.
 void UdpTransport::follow(const DataPlace& said) {
   followed_ = said;
   const Address group = ipv4_address(said.group);
+  if (!is_multicast(host_of(group))) return;
+  const std::string there = host_text(group) + ", port " + std::to_string(said.port);
   for (Socket& socket : sockets_) {
     if (!socket.membership) continue;
-    const Address bound = bound_address(socket.fd);
-    if (port_of(bound) != said.port) {
-      note_ = "the device sends to port " + std::to_string(said.port) + ", but posed listens on " +
-              endpoint_text(bound) + "; give the other port in \"listen\"";
+    const bool same_port = port_of(bound_address(socket.fd)) == said.port;
+    if (same_port && host_of(group) == host_of(socket.membership->group())) continue;
+    if (same_port) {
+      socket.membership->change_to(socket.fd, group);
+    } else if (const auto moved = move(socket, group, said.port); !moved) {
+      note_ = "the device sends to the group " + there + ", but " + moved.error().text();
+      continue;
     }
-    const bool is_joined = host_of(group) == host_of(socket.membership->group());
-    if (is_joined || !is_multicast(host_of(group))) continue;
-    socket.membership->change_to(socket.fd, group);
-    if (note_.empty()) {
-      note_ = "the device sends to the group " + host_text(group) + ", which is joined now";
-    }
+    note_ = "the device sends to the group " + there + ", which is joined now";
   }
+}
+
+// The socket of the other port takes the number of the old one, which another thread may be
+// reading.
+Result<> UdpTransport::move(Socket& socket, const Address& group, std::uint32_t port) {
+  const std::string listen = host_text(bound_address(socket.fd)) + ':' + std::to_string(port);
+  const auto address = TRY(parse_endpoint(listen));
+  const int fd = open_listener(address, true);
+  if (fd < 0) return fail("posed cannot listen on " + listen + " (" + errno_text() + ")");
+  auto joined = Membership::join(fd, group, interface_);
+  const bool moved = joined && ::dup3(fd, socket.fd, O_CLOEXEC) >= 0 && watch(socket.fd);
+  ::close(fd);
+  if (!joined) return std::unexpected(joined.error());
+  if (!moved) return fail("posed cannot open its port (" + errno_text() + ")");
+  socket.membership = *joined;
+  return {};
 }
 
 // A sender is a program, known by its address and port. One that is sent to (`to`) answers from

@@ -41,7 +41,7 @@ struct DataPlace {
 struct UdpSettings {
   std::vector<UdpSocketSettings> sockets{};  // [Chunk::socket]
   // Reads it from a datagram to socket 0; nullopt: it says nothing of it. RT-safe. Null: none does.
-  // The other sockets then join that group instead of their own.
+  // A socket with a group then joins that group at that port instead.
   std::optional<DataPlace> (*data_place)(std::span<const std::byte> datagram) noexcept = nullptr;
   // On which the groups are joined: its name or one of its addresses; empty: the system's choice.
   std::string interface{};
@@ -71,7 +71,7 @@ class UdpTransport final : public Transport, public Upkeep {
   [[nodiscard]] Chunk read(std::int64_t now_ns) noexcept override;
   // A sender none of whose datagrams the decoder could use gives up the socket to the next sender.
   RT_SAFE void decoded(bool used) noexcept override;
-  // Rejoins a silent group every two seconds; changes to the group that the device names.
+  // Rejoins a silent group every two seconds; changes to the group and port that the device names.
   void upkeep(std::int64_t now_ns) noexcept override;
   [[nodiscard]] std::string consume_note() override;
   using Transport::send;
@@ -82,7 +82,7 @@ class UdpTransport final : public Transport, public Upkeep {
     int fd = -1;
     std::optional<Address> to;  // a configured one, or the last sender
     bool keeps_to = false;      // `to` is configured
-    std::uint32_t dropped = 0;  // by the kernel, of all so far; begins again after 2^32
+    std::uint32_t dropped = 0;  // by the kernel, of all so far; begins again at another port
     std::optional<Membership> membership{};   // of upkeep; whether there is one never changes
     Host sender{};                            // whose datagrams are accepted
     std::uint16_t port = 0, port_before = 0;  // of that sender, and the one it had before
@@ -94,7 +94,10 @@ class UdpTransport final : public Transport, public Upkeep {
 
   UdpTransport();
   Result<> add(const UdpSocketSettings& settings, const UdpSettings& all);
+  // Whether the descriptor now counts for poll_fd().
+  [[nodiscard]] bool watch(int fd) const noexcept;
   void follow(const DataPlace& said);
+  Result<> move(Socket& socket, const Address& group, std::uint32_t port);
   // Fills the batch from the next socket that has datagrams; false when none has.
   [[nodiscard]] bool receive(std::int64_t now_ns) noexcept;
   // Returns whether the socket accepts datagrams of this sender, which it then belongs to.
@@ -117,6 +120,7 @@ class UdpTransport final : public Transport, public Upkeep {
   decltype(UdpSettings::data_place) data_place_ = nullptr;
   std::atomic<DataPlace> said_{};  // by the device
   DataPlace followed_{};           // of upkeep
+  std::string interface_{};        // the same: UdpSettings::interface
   std::string note_{};             // the same: for consume_note()
 };
 

@@ -413,13 +413,13 @@ TEST_CASE("a multicast group is received on the chosen interface") {
   }
 }
 
-TEST_CASE("the group that a device names is joined instead, and a wrong port is said") {
+TEST_CASE("the group and the port that a device names are used instead") {
   const UdpSettings settings{
       .sockets = {{.listen = "127.0.0.1:0"}, {.listen = "0.0.0.0:0", .group = "239.255.42.99"}},
       .data_place = [](std::span<const std::byte> bytes) noexcept -> std::optional<DataPlace> {
-        if (text_of(bytes).size() != 2) return std::nullopt;
+        if (bytes.size() != 3) return std::nullopt;
         const auto number = [&](std::size_t i) { return std::to_integer<std::uint32_t>(bytes[i]); };
-        return DataPlace{.group = 0xEFFF2A00U | number(0), .port = number(1)};
+        return DataPlace{.group = 0xEFFF2A00U | number(0), .port = number(1) << 8U | number(2)};
       },
       .interface = "lo",
       .peers = {"127.0.0.1"}};
@@ -432,25 +432,46 @@ TEST_CASE("the group that a device names is joined instead, and a wrong port is 
   const Peer peer("127.0.0.1:0");
   const in_addr loopback{.s_addr = htonl(INADDR_LOOPBACK)};
   REQUIRE(::setsockopt(peer.fd(), IPPROTO_IP, IP_MULTICAST_IF, &loopback, sizeof loopback) == 0);
-  const std::string endpoint = transport.endpoint(1);
-  const std::string port = endpoint.substr(endpoint.rfind(':'));
+  const auto port_at = [](const std::string& endpoint) {
+    return std::stoi(endpoint.substr(endpoint.rfind(':') + 1));
+  };
+  const auto announce = [&](char group, int port) {
+    REQUIRE(peer.send(transport.endpoint(0),
+                      {group, static_cast<char>(port >> 8), static_cast<char>(port & 0xFF)}));
+    CHECK(next(transport).size() == 3);
+    transport.upkeep(0);
+  };
+  const int first_port = port_at(transport.endpoint(1));
+  const auto to = [](int group, int port) {
+    return "239.255.42." + std::to_string(group) + ':' + std::to_string(port);
+  };
   REQUIRE(peer.send(transport.endpoint(0), "what is this?"));
   CHECK(next(transport) == "what is this?");
   transport.upkeep(0);
   CHECK(transport.consume_note().empty());
-  REQUIRE(peer.send(transport.endpoint(0), "b!"));
-  CHECK(next(transport) == "b!");
-  transport.upkeep(0);
-  CHECK(transport.consume_note().find("sends to port 33, but posed listens on") !=
-        std::string::npos);
+  announce('b', first_port);
+  CHECK(transport.consume_note().find("group 239.255.42.98, port ") != std::string::npos);
   CHECK(transport.consume_note().empty());
-  if (!peer.send("239.255.42.98" + port, "to all")) {
+  if (!peer.send(to(98, first_port), "to all")) {
     WARN("SKIPPED: this machine does not send multicast on loopback");
     return;
   }
   CHECK(next(transport) == "to all");
-  REQUIRE(peer.send("239.255.42.99" + port, "the group of before"));
+  REQUIRE(peer.send(to(99, first_port), "the group of before"));
   CHECK(next(transport) == "nothing");
+  auto taken = std::make_unique<Peer>("0.0.0.0:0");
+  const int port = port_at(taken->endpoint());
+  announce('c', port);
+  CHECK(transport.consume_note().find("cannot listen on 0.0.0.0:") != std::string::npos);
+  REQUIRE(peer.send(to(98, first_port), "where it was"));
+  CHECK(next(transport) == "where it was");
+  taken.reset();
+  announce('b', port);
+  CHECK(transport.consume_note().find("which is joined now") != std::string::npos);
+  REQUIRE(peer.send(to(98, first_port), "the port of before"));
+  CHECK(next(transport) == "nothing");
+  REQUIRE(peer.send(to(98, port), "at the other port"));
+  CHECK(next(transport) == "at the other port");
 }
 
 TEST_CASE("settings that open posed to the network or make no sense are refused") {
