@@ -1,6 +1,7 @@
 // Runs the real binary to its end.
 #pragma once
 
+#include <chrono>
 #include <string>
 #include <utility>
 #include <vector>
@@ -17,10 +18,11 @@ struct ProgramOutcome {
   std::string out, err;
 };
 
-inline ProgramOutcome posed(std::vector<std::string> arguments) {
+inline ProgramOutcome posed(std::vector<std::string> arguments,
+                            std::chrono::milliseconds within = Process::kPatience) {
   Process process(std::move(arguments));
   const std::string out = process.rest();
-  const auto code = process.exit_code();
+  const auto code = process.exit_code(within);
   REQUIRE(code);
   return {*code, out, process.errors()};
 }

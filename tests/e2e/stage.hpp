@@ -50,8 +50,8 @@ class Stage {
 
   // The log of record(), which has ended, gives the frames that were published, bit for bit.
   void check_replay() const {
-    const ProgramOutcome replay =
-        posed({"replay", path("take.plog"), "--speed", "max", "--expect"});
+    const ProgramOutcome replay = posed({"replay", path("take.plog"), "--speed", "max", "--expect"},
+                                        std::chrono::minutes(10));  // of an hour of 16 streams
     INFO(replay.err);
     CHECK(replay.code == 0);
   }

@@ -158,9 +158,9 @@ class Process {
     return {std::istreambuf_iterator<char>(file), {}};
   }
 
- private:
   static constexpr std::chrono::seconds kPatience{30};  // for sanitizers on a busy machine
 
+ private:
   static Command of_posed(std::vector<std::string> arguments, int most_files) {
     arguments.insert(arguments.begin(), posed_binary().string());
     if (most_files > 0) {
