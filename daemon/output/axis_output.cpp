@@ -58,8 +58,8 @@ std::shared_ptr<const Skeleton> own_avatar(const Skeleton& skeleton, axis::Avata
 
 }  // namespace
 
-Result<AxisFigure> AxisFigure::make(std::shared_ptr<const Skeleton> skeleton, std::uint8_t number,
-                                    std::string_view name) {
+Result<AxisFigure> AxisFigure::make(const std::shared_ptr<const Skeleton>& skeleton,
+                                    std::uint8_t number, std::string_view name) {
   axis::AvatarEntry entry;
   entry.avatar = axis::make_avatar(number, name);
   axis::AvatarEntry own = entry;
@@ -74,8 +74,7 @@ Result<AxisFigure> AxisFigure::make(std::shared_ptr<const Skeleton> skeleton, st
     }
     return axis::skeleton_of(entry, kOrder);
   };
-  auto fit =
-      TRY(Fit::make(avatar != nullptr ? avatar : std::move(skeleton), avatar != nullptr, figure));
+  auto fit = TRY(Fit::make(avatar != nullptr ? avatar : skeleton, avatar != nullptr, figure));
   AxisFigure made(std::move(fit), entry.offset_cm);
   made.message_.avatar = entry.avatar;
   made.message_.content.displacement = true;

@@ -30,8 +30,8 @@ namespace posed::output {
 class AxisFigure {
  public:
   // Makes the figure of a person (Fit::make) whose avatar has this number and name. Cold.
-  static Result<AxisFigure> make(std::shared_ptr<const Skeleton> skeleton, std::uint8_t number,
-                                 std::string_view name);
+  static Result<AxisFigure> make(const std::shared_ptr<const Skeleton>& skeleton,
+                                 std::uint8_t number, std::string_view name);
 
   // Returns a frame of the skeleton as "0 ann 0.000000 92.1... ||\n", valid until the next call. A
   // joint that was not measured keeps its rotation of the T-pose relative to its parent.

@@ -14,8 +14,9 @@ namespace {
 
 constexpr int kWaiting = 16;    // connections that the kernel keeps until they are let in
 constexpr int kMaxAtOnce = 16;  // that are let in or refused in one look
-// A few lines: what the kernel keeps for a client that does not read is old when it does.
-constexpr int kLineBuffer = 16 * 1024;  // bytes of each person; more would be old when it is read
+// Bytes of each person, a few lines: what the kernel keeps for a client that does not read is old
+// when it does.
+constexpr int kLineBuffer = 16 * 1024;
 constexpr std::int64_t kPatience_ns = 2 * kNanosPerSecond;
 
 // Whether the other side has closed the connection; discards what it has sent.

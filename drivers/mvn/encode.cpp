@@ -38,7 +38,7 @@ void write_vector(BigEndianWriter& writer, const Vec3f& v) {
 // is that of Cephes (atanf.c), within 1e-7 rad of the arc tangent up to 22.5 degrees, and several
 // times as fast as the library's function.
 float angle_deg(double sine, double cosine) {
-  constexpr double kTurn = std::numbers::pi / 4.0;
+  constexpr double kEighth = std::numbers::pi / 4.0;
   const double s = std::abs(sine), c = std::abs(cosine);
   const double shorter = std::min(s, c), longer = std::max(s, c);
   const bool steep = shorter > (std::numbers::sqrt2 - 1.0) * longer;
@@ -50,9 +50,9 @@ float angle_deg(double sine, double cosine) {
       t + t * z *
               (((8.05374449538e-2 * z - 1.38776856032e-1) * z + 1.99777106478e-1) * z -
                3.33329491539e-1);
-  if (steep) angle_rad += kTurn;
-  if (s > c) angle_rad = 2.0 * kTurn - angle_rad;
-  if (cosine < 0.0) angle_rad = 4.0 * kTurn - angle_rad;
+  if (steep) angle_rad += kEighth;
+  if (s > c) angle_rad = 2.0 * kEighth - angle_rad;
+  if (cosine < 0.0) angle_rad = 4.0 * kEighth - angle_rad;
   return static_cast<float>(std::copysign(angle_rad, sine) / kDegree);
 }
 
