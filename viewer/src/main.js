@@ -282,7 +282,7 @@ class Page {
     this.connection.sendText(READY);
     this.fresh = [];
     this.played.frame(performance.now());
-    this.world.ease(this.camera.camera.wanted);
+    this.world.ease(this.camera.camera.isBusy);
     const drawn = this.world.frame(({ stream }) => stream.isTake || this.fresh.push(stream));
     const done_ms = performance.now();
     // What is shown of the past is no measure of the present.

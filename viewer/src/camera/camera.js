@@ -21,7 +21,7 @@ export class Camera {
   #worker = null;
   #ready = false;
   #busy = false;
-  #wanted = false;
+  #wanted = false; // from start() to stop(), also while the browser asks
   #unused = null; // the timer that ends a worker without a camera
   #run = 0; // counts starts and stops: what an earlier one has begun is no more wanted
 
@@ -31,9 +31,13 @@ export class Camera {
     this.handlers = handlers;
   }
 
-  // From start() to stop(), also while the browser asks its user.
-  get wanted() {
-    return this.#wanted;
+  // Whether the processor has more to do than to draw.
+  get isBusy() {
+    return this.running || (this.#worker !== null && !this.#ready);
+  }
+
+  get isReady() {
+    return this.#ready;
   }
 
   get running() {

@@ -48,10 +48,13 @@ async function start() {
     results = found;
   });
   await finder.initialize();
-  // The first picture takes as long as twenty others: an empty one is found through at once.
-  const empty = new OffscreenCanvas(WIDTH, HEIGHT);
-  empty.getContext('2d').fillRect(0, 0, WIDTH, HEIGHT);
-  await finder.send({ image: empty.transferToImageBitmap() });
+  // The first picture takes as long as twenty others: an empty one is looked through at once.
+  const canvas = new OffscreenCanvas(WIDTH, HEIGHT);
+  canvas.getContext('2d').fillRect(0, 0, WIDTH, HEIGHT);
+  const empty = canvas.transferToImageBitmap();
+  await finder.send({ image: empty });
+  empty.close();
+  results?.image?.close?.();
   return finder;
 }
 

@@ -39,8 +39,16 @@ export const TILES = [
         : '',
   ],
   ['Jitter', 'how unevenly frames arrive', ({ stream }) => ms(stream.jitter.ms)],
-  ['Dropped, queue full', 'frames that found no room on their way to the publisher', ({ stats }) => count(stats.dropped)],
-  ['Skipped for newer', 'frames that waited until a newer one had come', ({ stats }) => count(stats.shed)],
+  [
+    'Dropped, queue full',
+    'frames for which posed had no room',
+    ({ stats }) => count(stats.dropped),
+  ],
+  [
+    'Skipped for newer',
+    'frames that waited until a newer one had come',
+    ({ stats }) => count(stats.shed),
+  ],
   [
     'Lost in the kernel',
     'datagrams that were not read in time',

@@ -5,7 +5,8 @@ import { el, write } from './dom.js';
 
 const CONSENT =
   'The picture stays in this browser; only 21 points a hand are sent to posed on this computer.';
-const LOADING = 'loading what finds hands (13 MB, once)';
+const LOADING = 'loading what finds hands (13 MB)';
+const STARTING = 'starting the camera';
 const NO_HAND = 'no hand is seen: hold one up, palm to the camera';
 const HIDDEN = 'stopped, because the page was hidden';
 const OFF = 'the camera is off: posed gets no hand of it';
@@ -22,7 +23,7 @@ export class CameraPanel {
   #refusal = '';
   #times_ms = []; // of the pictures of the last second
   #said = '';
-  #starting = false;
+  #starting = null; // this start, until it has succeeded, failed or been stopped
   readOnly = '';
   // Of the pictures since the start; the ages are those of the last ones.
   frames = 0;
@@ -93,6 +94,8 @@ export class CameraPanel {
 
   stop(sentence = '') {
     if (!this.camera.running && !this.#starting) return;
+    this.#starting = null;
+    this.button.disabled = this.readOnly !== '';
     this.camera.stop(); // also while the browser asks the user
     this.#show(sentence);
   }
@@ -107,20 +110,23 @@ export class CameraPanel {
     this.#refusal = '';
     this.frames = 0;
     this.found = 0;
-    write(this.words, LOADING);
+    const words = this.camera.isReady ? STARTING : LOADING;
+    write(this.words, words);
     this.button.disabled = true;
-    this.#starting = true;
+    const start = {};
+    this.#starting = start;
     try {
       await this.camera.start(this.device.value);
-      if (this.camera.running) {
-        this.#show(LOADING);
-        await this.#listDevices();
-      }
+      if (this.#starting !== start) return;
+      this.#show(words);
+      await this.#listDevices();
     } catch (error) {
+      if (this.#starting !== start) return;
       this.camera.stop();
       this.#show(wordsOf(error));
     }
-    this.#starting = false;
+    if (this.#starting !== start) return;
+    this.#starting = null;
     this.button.disabled = this.readOnly !== '';
   }
 

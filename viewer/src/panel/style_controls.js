@@ -42,7 +42,7 @@ export class StyleControls {
       send: (number) =>
         this.control(
           { set_parameter: { stream: this.name, name: 'style.alpha', number } },
-          `${this.name}: α ${signed(number, 2)}`,
+          `${this.name}: amount ${signed(number, 2)}`,
         ),
     });
     const scale = el(

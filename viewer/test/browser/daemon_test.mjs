@@ -90,7 +90,7 @@ told(
       alpha += 0.1;
       await field.fill(alpha.toFixed(1));
       await field.press('Enter');
-      await acknowledged(page, `walker: α ${alpha.toFixed(2)}: applied at frame`);
+      await acknowledged(page, `walker: amount ${alpha.toFixed(2)}: applied at frame`);
       return Number(/\((\d+) ms\)/.exec(await page.locator('.ack').first().innerText())[1]);
     };
     assert.ok((await askedAgain(effect_ms, (ms) => ms < 1000)) < 1000); // 300 on a quiet machine
