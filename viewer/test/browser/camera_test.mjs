@@ -121,7 +121,20 @@ test('a hand before the camera is sent, until the page may not or is hidden', op
   });
   assert.deepEqual(asked, { running: false, words: 'enough' });
   assert.equal(bridge.landmarks.length, sent);
-  await button(page).click();
+  // Another camera is chosen while the browser asks, and the first one is refused then.
+  await page.evaluate(async () => {
+    const { mediaDevices } = navigator;
+    let refuse;
+    mediaDevices.getUserMedia = () =>
+      new Promise((_, reject) => {
+        refuse = reject;
+        delete mediaDevices.getUserMedia;
+      });
+    const { camera } = globalThis.posedPage;
+    camera.toggle();
+    camera.device.onchange();
+    refuse(new Error('the first one'));
+  });
   await keepTrack(page);
   await button(page).click();
   assert.equal(await trackState(page), 'ended');
