@@ -56,6 +56,31 @@ std::vector<std::pair<int, double>> between(const std::vector<std::pair<double, 
   return found;
 }
 
+using Turns = std::array<Quaterniond, kMaxJoints>;
+
+Quaterniond turn_between(const Turns& before, const Turns& after, int bone) noexcept {
+  const auto i = static_cast<std::size_t>(bone);
+  return after[i] * before[i].conjugate();
+}
+
+Vector3d turns_by(const std::vector<std::pair<int, double>>& shares, const Turns& before,
+                  const Turns& after) noexcept {
+  Vector3d sum = Vector3d::Zero();
+  for (const auto& [bone, share] : shares) {
+    sum += share * rotation_log(turn_between(before, after, bone));
+  }
+  return sum;
+}
+
+void add_share(std::vector<std::pair<int, double>>& shares, int bone, double share) {
+  const auto at = std::ranges::find(shares, bone, [](const auto& one) { return one.first; });
+  if (at == shares.end()) {
+    shares.emplace_back(bone, share);
+  } else {
+    at->second += share;
+  }
+}
+
 }  // namespace
 
 std::vector<double> trunk_places(const Skeleton& skeleton) {
@@ -80,7 +105,8 @@ std::vector<double> trunk_places(const Skeleton& skeleton) {
 
 // Two figures divide a trunk at other places and give the same names to other parts of it, so a
 // joint between the hips and the head turns as what of the taught trunk lies where its own bone
-// does. `taught`: places, upwards, and bones.
+// does. What the neck turns otherwise the bones below it give back over their length, so that the
+// head leans as far as the taught one. `taught`: places, upwards, and bones.
 void BoneTurns::match_trunk(const std::vector<std::pair<double, int>>& taught) {
   const std::vector<double> places = trunk_places(skeleton_);
   const int hips = skeleton_.joint_of(Bone::kHips);
@@ -90,38 +116,29 @@ void BoneTurns::match_trunk(const std::vector<std::pair<double, int>>& taught) {
   if (taught.size() < 2 || place(head) < 0.0) return;
   // What lies between the neck and the head rides on the neck.
   int j = place(neck) >= 0.0 ? neck : skeleton_.joints[static_cast<std::size_t>(head)].parent;
-  std::vector<std::pair<int, double>> beyond;  // what the neck turns more than by its place
   double to = 1.0;
   for (; j != hips; j = skeleton_.joints[static_cast<std::size_t>(j)].parent) {
     Part& part = parts_[static_cast<std::size_t>(j)];
     part.turns_as = between(taught, place(j), to, 1.0);
     if (j == neck && part.bone >= 0) {
+      neck_ = j;
       for (auto& [bone, share] : part.turns_as) {
         share *= 1.0 - kNeckByName;
-        beyond.emplace_back(bone, -share);
+        gives_back_.emplace_back(bone, share);
       }
-      part.turns_as.emplace_back(part.bone, kNeckByName);
-      beyond.emplace_back(part.bone, kNeckByName);
+      add_share(part.turns_as, part.bone, kNeckByName);
+      add_share(gives_back_, part.bone, -kNeckByName);
+    } else {
+      part.gives_back = neck_ >= 0;
     }
     if (part.bone < 0) part.bone = taught[1].second;
     part.rides = false;
     to = place(j);
   }
-  keep_lean(beyond, place(neck), to);
-}
-
-// The bones between the hips and the neck give back what the neck turns `beyond` its place, over
-// their length, so that the head leans as far as the taught one.
-void BoneTurns::keep_lean(const std::vector<std::pair<int, double>>& beyond, double neck,
-                          double lowest) {
-  if (beyond.empty() || neck - lowest < 1.0 - neck) return;  // a neck longer than the trunk
-  const double back = (1.0 - neck) / (neck - lowest);
-  int j = skeleton_.joints[static_cast<std::size_t>(skeleton_.joint_of(Bone::kNeck))].parent;
-  for (; j != skeleton_.joint_of(Bone::kHips);
-       j = skeleton_.joints[static_cast<std::size_t>(j)].parent) {
-    auto& turns_as = parts_[static_cast<std::size_t>(j)].turns_as;
-    for (const auto& [bone, share] : beyond) turns_as.emplace_back(bone, -back * share);
-  }
+  // A neck that is longer than the trunk is not given back whole, or the trunk would bend double.
+  const double length = 1.0 - place(neck);
+  const double back = std::min(1.0, length / std::max(place(neck) - to, kThinnest));
+  for (auto& [bone, share] : gives_back_) share *= back;
 }
 
 std::optional<BoneTurns> BoneTurns::make(const motion::PoseSpaceSpec& spec,
@@ -183,14 +200,13 @@ RT_SAFE void BoneTurns::find_taught(std::span<const float> from, std::span<const
   }
 }
 
-// Where the walker's joint is turned as `own`. An arm's direction gets the taught change of
-// direction, and the arm turns about itself as the taught one does.
+// Where the walker's joint is turned as `own`, and the trunk leans back by `back`. An arm's
+// direction gets the taught change of direction, and the arm turns about itself as the taught one
+// does.
 RT_SAFE Quaterniond BoneTurns::turn_of(const Part& part, const Quaterniond& own,
-                                       const Turns& before, const Turns& after) const noexcept {
-  const auto turned = [&](int bone) {
-    const auto i = static_cast<std::size_t>(bone);
-    return Quaterniond(after[i] * before[i].conjugate());
-  };
+                                       const Vector3d& back, const Turns& before,
+                                       const Turns& after) const noexcept {
+  const auto turned = [&](int bone) { return turn_between(before, after, bone); };
   if (part.along) {
     const auto b = static_cast<std::size_t>(part.bone);
     const Vector3d taught = before[b] * part.in_t_pose;
@@ -202,10 +218,23 @@ RT_SAFE Quaterniond BoneTurns::turn_of(const Part& part, const Quaterniond& own,
       return minimal_rotation(all * now, then.normalized()) * all;
     }
   }
-  if (part.turns_as.size() == 1) return turned(part.turns_as.front().first);
-  Vector3d sum = Vector3d::Zero();
-  for (const auto& [bone, share] : part.turns_as) sum += share * rotation_log(turned(bone));
+  if (part.turns_as.size() == 1 && !part.gives_back) return turned(part.turns_as.front().first);
+  Vector3d sum = turns_by(part.turns_as, before, after);
+  if (part.gives_back) sum += back;
   return rotation_exp(sum);
+}
+
+// As far as the neck takes part in this frame.
+RT_SAFE Vector3d BoneTurns::back_of(const Frame& frame, std::span<const float> shares,
+                                    const Turns& before, const Turns& after) const noexcept {
+  if (neck_ < 0 || !frame.valid[static_cast<std::size_t>(neck_)]) return Vector3d::Zero();
+  return share_of(parts_[static_cast<std::size_t>(neck_)], shares) *
+         turns_by(gives_back_, before, after);
+}
+
+RT_SAFE double BoneTurns::share_of(const Part& part, std::span<const float> shares) const noexcept {
+  const Taught& bone = taught_[static_cast<std::size_t>(part.bone)];
+  return shares[static_cast<std::size_t>(bone.first_dim)];
 }
 
 RT_SAFE void BoneTurns::add(Frame& frame, double heading_rad, std::span<const float> from,
@@ -213,6 +242,7 @@ RT_SAFE void BoneTurns::add(Frame& frame, double heading_rad, std::span<const fl
                             std::span<const float> shares) const noexcept {
   Turns before, after;
   find_taught(from, change, before, after);
+  const Vector3d back = back_of(frame, shares, before, after);
   const Quaterniond seen = axis_rotation(Axis::kY, -heading_rad);
   Turns pose, turn;  // of each joint, seen from the heading
   for (std::size_t j = 0; j < parts_.size() && j < frame.joint_count; ++j) {
@@ -224,10 +254,9 @@ RT_SAFE void BoneTurns::add(Frame& frame, double heading_rad, std::span<const fl
     turn[j] = carried;
     const Part& part = parts_[j];
     if (part.rides || !frame.valid[j]) continue;
-    const auto b = static_cast<std::size_t>(part.bone);
-    const double share = shares[static_cast<std::size_t>(taught_[b].first_dim)];
+    const double share = share_of(part, shares);
     if (share == 0.0) continue;
-    turn[j] = turn_of(part, pose[j], before, after);
+    turn[j] = turn_of(part, pose[j], back, before, after);
     const Quaterniond own = carried.conjugate() * turn[j];
     if (share < 1.0) turn[j] = carried * rotation_exp(Vector3d(share * rotation_log(own)));
     const Quaterniond base = above < 0 ? seen : pose[p];

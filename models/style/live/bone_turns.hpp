@@ -50,6 +50,7 @@ class BoneTurns {
     bool rides = true;
     // The taught bones whose turns it gets, each by a share of 1; mostly the one of its name.
     std::vector<std::pair<int, double>> turns_as{};
+    bool gives_back = false;  // what the neck turns more than by its place
     // An arm's direction in its joint's frame, and in the T-pose.
     std::optional<Eigen::Vector3d> along{};
     Eigen::Vector3d in_t_pose = Eigen::Vector3d::Zero();
@@ -58,16 +59,23 @@ class BoneTurns {
 
   BoneTurns() = default;
   void match_trunk(const std::vector<std::pair<double, int>>& taught);
-  void keep_lean(const std::vector<std::pair<int, double>>& beyond, double neck, double lowest);
   RT_SAFE void find_taught(std::span<const float> from, std::span<const float> change,
                            Turns& before, Turns& after) const noexcept;
   RT_SAFE [[nodiscard]] Eigen::Quaterniond turn_of(const Part& part, const Eigen::Quaterniond& own,
-                                                   const Turns& before,
+                                                   const Eigen::Vector3d& back, const Turns& before,
                                                    const Turns& after) const noexcept;
+  RT_SAFE [[nodiscard]] Eigen::Vector3d back_of(const Frame& frame, std::span<const float> shares,
+                                                const Turns& before,
+                                                const Turns& after) const noexcept;
+  RT_SAFE [[nodiscard]] double share_of(const Part& part,
+                                        std::span<const float> shares) const noexcept;
 
   Skeleton skeleton_;
   std::vector<Taught> taught_;  // the one above before the one below
   std::vector<Part> parts_;     // [joint]
+  int neck_ = -1;               // the joint, where it turns more than by its place
+  // The taught bones whose turns the trunk gives back, by shares with a sum of 0.
+  std::vector<std::pair<int, double>> gives_back_;
 };
 
 }  // namespace posed::style

@@ -23,6 +23,7 @@ constexpr double kSame_deg = 7.0, kOther_deg = 9.5;         // either; so near a
 constexpr double kStill_deg_s = 8.0, kMoving_deg_s = 16.0;  // PoseSpeed
 constexpr double kRest = 0.25, kSwing = 0.4;                // of the training's least swing
 constexpr double kTooSlow = 0.2, kSlow = 0.3;               // of the training's fastest cadence
+constexpr double kSlowestPace = 0.45;                       // the same, at which strides are seen
 constexpr double kFirstStep_rad =
     4.0;  // of a stride after rest, as the cadence lags by half a second
 constexpr double kFast = 1.2, kTooFast = 1.32;
@@ -175,7 +176,7 @@ RT_SAFE void Gate::see_legs(const TrainedMotion& known, const Frame& frame,
 RT_SAFE double Gate::pace_rad_s(const TrainedMotion& known) const noexcept {
   const double usual_rad_s = known.cadence_rad_s();
   if (cadence_rad_s_ == 0.0) return usual_rad_s;
-  return std::clamp(steady_rad_s_, kSlow * usual_rad_s, usual_rad_s);
+  return std::clamp(steady_rad_s_, kSlowestPace * usual_rad_s, usual_rad_s);
 }
 
 // 1 where legs or body rest.

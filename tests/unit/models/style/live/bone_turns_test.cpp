@@ -4,6 +4,7 @@
 
 #include <catch2/catch.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <vector>
@@ -32,6 +33,18 @@ struct Build {
     std::vector<std::uint8_t> available(dims);
     space.to_vector(frame, 0.4, q, available);
     return q;
+  }
+  // For a training whose figure has its neck there and is as the walker's otherwise.
+  [[nodiscard]] style::BoneTurns turns_of_taught_neck(double at, const Skeleton& skeleton) const {
+    const auto places = style::trunk_places(*walk.skeleton);
+    std::vector<double> taught;
+    for (const std::string& name : spec.joints) {
+      const Bone bone = *bone_from_name(name);
+      taught.push_back(bone == Bone::kNeck
+                           ? at
+                           : places[static_cast<std::size_t>(walk.skeleton->joint_of(bone))]);
+    }
+    return style::BoneTurns::make(spec, taught, skeleton).value();
   }
   // A change of one bone.
   [[nodiscard]] std::vector<float> change_of(Bone bone, const Vector3d& turn_rad) const {
@@ -159,25 +172,51 @@ TEST_CASE("a longer neck that turns as the taught one does not lean the head fur
   const auto places = style::trunk_places(skeleton);
   const double neck = places[static_cast<std::size_t>(skeleton.joint_of(Bone::kNeck))];
   const double length = 0.5 * (1.0 - neck);  // of the taught neck, half the walker's
-  std::vector<double> taught;
-  for (const std::string& name : build.spec.joints) {
-    const Bone bone = *bone_from_name(name);
-    taught.push_back(bone == Bone::kNeck
-                         ? 1.0 - length
-                         : places[static_cast<std::size_t>(skeleton.joint_of(bone))]);
-  }
-  build.turns = style::BoneTurns::make(build.spec, taught, skeleton).value();
+  build.turns = build.turns_of_taught_neck(1.0 - length, skeleton);
   const Frame plain = build.walk.frame(20);
-  Frame styled = plain;
-  build.turns.add(styled, 0.4, build.vector_of(plain), build.change_of(Bone::kNeck, {0.4, 0, 0}),
+  const auto change = build.change_of(Bone::kNeck, {0.4, 0, 0});
+  const auto bent_rad = [&](const Frame& in, const std::vector<float>& shares, Bone from, Bone to) {
+    Frame styled = in;
+    build.turns.add(styled, 0.4, build.vector_of(plain), change, shares);
+    const auto pitch_rad = [&](const Frame& frame) {
+      const Vector3d along = build.direction(frame, from, to);
+      return std::atan2(along.z(), along.y());
+    };
+    return pitch_rad(styled) - pitch_rad(in);
+  };
+  CHECK(bent_rad(plain, build.all, Bone::kNeck, Bone::kHead) > 0.25);
+  CHECK(bent_rad(plain, build.all, Bone::kHips, Bone::kHead) ==
+        Approx(0.4 * length).margin(0.1 * length));
+  // The trunk gives back what the neck turns, and no more.
+  const double whole_rad = bent_rad(plain, build.all, Bone::kHips, Bone::kNeck);
+  CHECK(whole_rad < -0.01);
+  const auto neck_dim =
+      static_cast<std::size_t>(std::ranges::find(build.spec.joints, bone_name(Bone::kNeck)) -
+                               build.spec.joints.begin()) *
+      3;
+  auto masked = build.all;
+  masked[neck_dim] = 0.5F;
+  CHECK(bent_rad(plain, masked, Bone::kHips, Bone::kNeck) == Approx(0.5 * whole_rad).epsilon(0.05));
+  masked[neck_dim] = 0.0F;
+  CHECK(bent_rad(plain, masked, Bone::kHips, Bone::kNeck) == Approx(0.0).margin(1e-5));
+  Frame unmeasured = plain;
+  unmeasured.valid[static_cast<std::size_t>(skeleton.joint_of(Bone::kNeck))] = false;
+  CHECK(bent_rad(unmeasured, build.all, Bone::kHips, Bone::kNeck) == Approx(0.0).margin(1e-5));
+}
+
+TEST_CASE("a trunk of one bone without a neck of any length turns by finite angles",
+          "[style][bone_turns]") {
+  Build build;
+  Skeleton thin = *build.walk.skeleton;
+  int j = thin.joint_of(Bone::kHead);
+  for (; j != thin.joint_of(Bone::kSpine); j = thin.joints[static_cast<std::size_t>(j)].parent) {
+    thin.joints[static_cast<std::size_t>(j)].offset_m.setZero();
+  }
+  build.turns = build.turns_of_taught_neck(0.8, thin);
+  Frame styled = build.walk.frame(20);
+  build.turns.add(styled, 0.4, build.vector_of(styled), build.change_of(Bone::kNeck, {0.4, 0, 0}),
                   build.all);
-  const auto pitch_rad = [&](const Frame& frame, Bone from, Bone to) {
-    const Vector3d along = build.direction(frame, from, to);
-    return std::atan2(along.z(), along.y());
-  };
-  const auto bent_rad = [&](Bone from, Bone to) {
-    return pitch_rad(styled, from, to) - pitch_rad(plain, from, to);
-  };
-  CHECK(bent_rad(Bone::kNeck, Bone::kHead) > 0.25);
-  CHECK(bent_rad(Bone::kHips, Bone::kHead) == Approx(0.4 * length).margin(0.1 * length));
+  for (std::size_t joint = 0; joint < styled.joint_count; ++joint) {
+    for (const float part : styled.rotation_xyzw[joint]) CHECK(std::isfinite(part));
+  }
 }
