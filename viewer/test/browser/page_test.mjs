@@ -182,7 +182,7 @@ pageTests(
     'keys: arrows choose and change, ? explains, fields type': async (page, bridge) => {
       await page.locator('.stage canvas').focus();
       await page.keyboard.press('ArrowLeft');
-      await acknowledged(page, 'α 0.95');
+      await acknowledged(page, 'amount 0.95');
       assert.equal(bridge.daemon.bodies[0].target, 0.95);
       await page.keyboard.press('?');
       await page.locator('#help[open]').waitFor(PATIENCE);
