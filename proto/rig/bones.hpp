@@ -65,6 +65,9 @@ struct FoundBones {
 
 void swap_all_sides(BoneJoints& bones);
 
+// Whether the names say of the legs or of the arms which one is left.
+[[nodiscard]] bool has_named_sides(const std::vector<JointName>& names, const BoneJoints& bones);
+
 // Swaps the sides of a person whose zero pose, by them, does not face `facing`. Returns whether it
 // did.
 bool turn_to_face(const Vec& facing, const Figure& figure, BoneJoints& bones);

@@ -9,6 +9,7 @@ Vec mirror(const Vec& v) { return {-v.x(), v.y(), v.z()}; }
 
 constexpr double kStraightShin_deg = 15;  // of a figure whose legs are together
 constexpr double kToeAside_deg = 20;      // of a foot's outer toes
+constexpr double kIntoGround_deg = 25;    // from straight down
 constexpr double kSureLateral = 0.75;
 constexpr double kOnAxis_deg = 1;
 
@@ -37,7 +38,7 @@ void Frames::legs() {
   // Toes that point into the ground show that the axes of the legs are their own.
   const bool into_ground =
       toes[0] && toes[1] &&
-      std::min(angle_deg(Th * *toes[0], -kY), angle_deg(Th * *toes[1], -kY)) < 25;
+      std::min(angle_deg(Th * *toes[0], -kY), angle_deg(Th * *toes[1], -kY)) < kIntoGround_deg;
   if (!real || into_ground) {
     folded_legs(thigh);
     return;
@@ -45,18 +46,20 @@ void Frames::legs() {
   if (legs_by_feet(thigh)) return;
   for (const Side side : kSides) {
     leg(side, minimal(world[at(side)], -kY) * Th, 1.0, "zero pose");
-    real_foot(side, sure(on(side, Bone::kLeftLowerLeg)), "zero pose", false);
+    real_foot(side, sure(on(side, Bone::kLeftLowerLeg)), false);
   }
 }
 
 // Feet that both point aside say where forward is in the legs' own frames. Tips alone do not: an
-// end site may be anywhere.
+// end site may be anywhere. What points down points nowhere.
 bool Frames::legs_by_feet(const Both& thigh) {
   const Mat Th = *t_frame(Bone::kHips);
   const auto toes = std::array{toe_way(Side::kLeft), toe_way(Side::kRight)};
   if (!toes[0] || !toes[1]) return false;
-  const auto aside_deg = [&Th](const Vec& way) {
-    return std::atan2((Th * way).x(), (Th * way).z()) / kDegree;
+  const auto aside_deg = [&Th](const Vec& toes_way) {
+    const Vec way = Th * toes_way;
+    const bool is_down = angle_deg(way, -kY) < kIntoGround_deg;
+    return is_down ? 0.0 : std::atan2(way.x(), way.z()) / kDegree;
   };
   const auto point_aside = [&](const Both& ways) {
     const double left_deg = aside_deg(ways[0]);
@@ -68,9 +71,8 @@ bool Frames::legs_by_feet(const Both& thigh) {
                        *off(Bone::kRightFoot, Bone::kRightToes)};
   if (!point_aside({*toes[0], *toes[1]}) || !point_aside(to_joints)) return false;
   for (const Side side : kSides) {
-    const std::string why = "the foot gives forward";
-    leg(side, frame(thigh[at(side)], -kY, *toes[at(side)], kZ), 0.9, why);
-    real_foot(side, sure(on(side, Bone::kLeftLowerLeg)), "zero pose, as " + why, true);
+    leg(side, frame(thigh[at(side)], -kY, *toes[at(side)], kZ), 0.9, "the foot gives forward");
+    real_foot(side, sure(on(side, Bone::kLeftLowerLeg)), true);
   }
   return true;
 }
@@ -138,7 +140,7 @@ void Frames::leg(Side side, const Mat& T_thigh, double sure_leg, const std::stri
 
 // A figure that stands has flat soles, also where its legs are apart, unless the foot itself shows
 // that it was laid along the shin.
-void Frames::real_foot(Side side, double sure_foot, const std::string& why, bool by_feet) {
+void Frames::real_foot(Side side, double sure_foot, bool by_feet) {
   const Bone foot = on(side, Bone::kLeftFoot);
   const Bone lower = on(side, Bone::kLeftLowerLeg);
   if (!joint_.has(foot)) return;
@@ -146,7 +148,7 @@ void Frames::real_foot(Side side, double sure_foot, const std::string& why, bool
   const Mat Th = by_feet ? *t_frame(on(side, Bone::kLeftUpperLeg)) : *t_frame(Bone::kHips);
   const auto way = rest(lower, {foot});
   Mat Tf = Th;
-  std::string why_foot = "flat sole in the " + why;
+  std::string why_foot = "flat sole in the zero pose";
   const double slant_deg = way ? angle_deg(Th * *way, -kY) : 0.0;
   const Sole sole = slant_deg > 3 ? sole_of(side, Th, Tl) : Sole::kFlat;
   if (sole == Sole::kAlongShin) {
@@ -154,7 +156,7 @@ void Frames::real_foot(Side side, double sure_foot, const std::string& why, bool
     why_foot = "goes with the shin";
   } else if (sole == Sole::kUnclear && slant_deg >= kStraightShin_deg) {
     sure_foot = std::min(sure_foot, 0.4);
-    why_foot = "legs apart in the " + why + ": the sole is taken for flat";
+    why_foot = "legs apart in the zero pose: the sole is taken for flat";
   }
   const auto toes = toe_way(side);
   if (toes && angle_deg(Tf * *toes, kZ) > 75) {

@@ -35,12 +35,12 @@ void extend(Choices& choices, const Fit& fit, int joint, int rank,
 }
 
 // Of two joints that are called alike, a limb goes on in the one with more below it, or else in the
-// farther one; the other helps the skin there. Where toes are told apart, the first counts.
+// farther one; the other helps the skin there. Of toes that are counted the first counts.
 bool leads_on(const Figure& figure, const std::vector<JointName>& names, int joint, int before,
-              bool is_end) {
+              bool are_toes) {
   const bool counted = names[joint].stem == names[before].stem && !names[joint].digits.empty() &&
                        !names[before].digits.empty();
-  if (is_end && counted && figure[joint].parent == figure[before].parent) {
+  if (are_toes && counted && figure[joint].parent == figure[before].parent) {
     return names[joint].digits < names[before].digits;
   }
   const int more = figure.main_chain_length(joint) - figure.main_chain_length(before);
@@ -65,7 +65,7 @@ std::vector<bool> copies_in(const std::vector<JointName>& names) {
 
 std::array<int, kSlots> best_chain(const Figure& figure, const std::vector<JointName>& names,
                                    const std::vector<std::optional<Fit>>& fits,
-                                   const std::array<bool, kSlots>& needed) {
+                                   const std::array<bool, kSlots>& needed, bool is_leg) {
   std::vector<Choices> at(fits.size());
   Choice best{.value = 0.0};
   int last = -1;
@@ -80,9 +80,9 @@ std::array<int, kSlots> best_chain(const Figure& figure, const std::vector<Joint
     extend(at[j], *fits[j], j, figure.depth(j) - 1, needed);
     const Choice& top = best_of(at[j]);
     const double more = top.value - best.value;
-    const bool is_end = top.joint.back() == j;
+    const bool is_toes = is_leg && top.joint.back() == j;
     if (more < -1e-9) continue;
-    if (more <= 1e-9 && (last < 0 || !leads_on(figure, names, j, last, is_end))) continue;
+    if (more <= 1e-9 && (last < 0 || !leads_on(figure, names, j, last, is_toes))) continue;
     best = top;
     last = j;
   }
@@ -245,7 +245,7 @@ void find_limbs(const Figure& figure, const std::vector<JointName>& names, BoneJ
     }
     const std::size_t end = first == Bone::kLeftUpperLeg ? 2 : 3;  // foot or hand
     drop_marks(figure, end, fits);
-    auto chain = best_chain(figure, names, fits, needed);
+    auto chain = best_chain(figure, names, fits, needed, end == 2);
     settle_pieces(figure, names, first == Bone::kLeftUpperLeg ? 0 : 1, leg, chain);
     if (chain[end - 1] >= 0 && chain[end] < 0) {
       chain[end] = next_of_limb(figure, names, chain[end - 1], end == 2 ? chain[3] : -1);

@@ -17,7 +17,8 @@ constexpr double kMaxLength = 1e9;
 struct LengthUnit {
   double metres;
   std::string_view name;
-  double doubt;  // how much worse the fit of a more usual unit may be
+  double doubt;              // how much worse the fit of a more usual unit may be
+  double named_doubt = 0.0;  // the same, where the names are those of its maker
 };
 constexpr double kInch_m = 0.0254;
 constexpr double kCmu_m = kInch_m / 0.45;
@@ -33,7 +34,7 @@ constexpr std::array<LengthUnit, 10> kLengthUnits{
      {0.1, "decimetres", 0.3},
      {0.3048, "feet", 0.35},
      {kCmu_m, "inches / 0.45", 0.6},
-     {kPoser_m, "Poser's units of 8 feet", kNever},
+     {kPoser_m, "Poser's units of 8 feet", kNever, 0.6},  // others write such names too
      {kMmd_m, "MikuMikuDance's units of 8 cm", kNever},
      {kHundred, "metres that the file calls centimetres", kNever}}};
 
@@ -57,7 +58,7 @@ double usual_unit_m(const std::vector<RigJoint>& joints, const std::vector<Joint
 
 const LengthUnit& unit_for(double length, double true_m, double usual_m) {
   return *std::ranges::min_element(kLengthUnits, {}, [&](const LengthUnit& unit) {
-    const double doubt = unit.metres == usual_m ? 0.0 : unit.doubt;
+    const double doubt = unit.metres == usual_m ? unit.named_doubt : unit.doubt;
     return std::abs(std::log(length * unit.metres / true_m)) + doubt;
   });
 }
@@ -178,9 +179,10 @@ void doubt_places(const FoundBones& found, const RigInput& input, Rig& rig) {
 }
 
 // Knees and elbows bend one way: where neither names nor feet say which side of a person is left,
-// they do.
+// they do. What the names say of one limb they do not undo.
 void side_by_bends(const Figure& figure, const std::vector<JointName>& names, const Motion& motion,
                    FoundBones& found) {
+  if (has_named_sides(names, found.joint)) return;
   std::vector<std::string> notes;  // of an attempt, which nobody reads
   Frames frames(figure, names, found.joint, motion, notes);
   if (!frames.can_find_person()) return;
@@ -208,8 +210,8 @@ void settle_facing(const RigInput& input, const Figure& figure, FoundBones& foun
         "bones are known by shape only; left and right by how knees and elbows bend in the clip");
   } else if (found.sides_by == SidesBy::kNothing) {
     found.notes.emplace_back(
-        "which side is left is not known: neither the names nor the feet say it; say which axis "
-        "the zero pose faces (facing)");
+        "which side is left is not known: neither names, feet nor bends say it of all limbs; say "
+        "which axis the zero pose faces (facing)");
   }
   rig.why_facing = by_profile                          ? "by the bones of the profile"
                    : input.facing                      ? "as you say"

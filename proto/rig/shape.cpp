@@ -205,10 +205,10 @@ void set_limb(const Pair& pair, bool arm, const TwoBones& two, BoneJoints& bones
   }
 }
 
-// Whether `bones` has a limb's sides right: by its names, else by the line from right to left.
-bool sides_are_right(const std::vector<JointName>& names, const BoneJoints& bones,
-                     const std::array<Bone, 4>& limb, const Vec& line, const Vec& left, bool sure,
-                     SidesBy& sides_by) {
+// Above 0 where the names say that `bones` has a limb's sides right, below 0 where they say that it
+// has them wrong.
+int votes_by_name(const std::vector<JointName>& names, const BoneJoints& bones,
+                  const std::array<Bone, 4>& limb) {
   int votes = 0;
   for (const Side side : kSides) {
     for (const Bone bone : limb) {
@@ -216,6 +216,14 @@ bool sides_are_right(const std::vector<JointName>& names, const BoneJoints& bone
       if (joint >= 0) votes += static_cast<int>(names[joint].side) * (side == Side::kLeft ? 1 : -1);
     }
   }
+  return votes;
+}
+
+// Whether `bones` has a limb's sides right: by its names, else by the line from right to left.
+bool sides_are_right(const std::vector<JointName>& names, const BoneJoints& bones,
+                     const std::array<Bone, 4>& limb, const Vec& line, const Vec& left, bool sure,
+                     SidesBy& sides_by) {
+  const int votes = votes_by_name(names, bones, limb);
   if (votes != 0) return votes > 0;
   const bool unclear =
       !sure || line.norm() < 1e-9 || std::abs(direction(line).dot(direction(left))) < 0.5;
@@ -276,6 +284,10 @@ bool is_on_four(const std::array<Vec, 4>& begin, const std::array<Vec, 4>& end) 
 }
 
 }  // namespace
+
+bool has_named_sides(const std::vector<JointName>& names, const BoneJoints& bones) {
+  return votes_by_name(names, bones, kLeg) != 0 || votes_by_name(names, bones, kArm) != 0;
+}
 
 bool is_animal(const Figure& figure, const Motion& motion, const BoneJoints& bones) {
   std::array<int, 4> begin{};

@@ -97,7 +97,7 @@ class Frames {
   void folded_legs(const Both& thigh);
   [[nodiscard]] std::vector<Lateral> laterals(Side side, const Vec& thigh) const;
   void leg(Side side, const Mat& T, double sure, const std::string& why);
-  void real_foot(Side side, double sure, const std::string& why, bool by_feet);
+  void real_foot(Side side, double sure, bool by_feet);
   void folded_foot(Side side, double sure);
   enum class Sole : std::uint8_t { kFlat, kAlongShin, kUnclear };
   [[nodiscard]] Sole sole_of(Side side, const Mat& T_flat, const Mat& T_shin) const;

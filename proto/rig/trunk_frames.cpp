@@ -27,9 +27,12 @@ struct Score {
   double mean = 0.0;   // of the trunk's part along the axis
 };
 
-std::string doubt_of(const Score& other) {
-  return "which axis points up is not sure: the zero pose is folded, and the trunk points along " +
-         std::string(up_text(other.up)) + " in " + short_text(100 * other.stand, 0) +
+std::string doubt_of(const Score& other, const Score* zero) {
+  const std::string is_so =
+      zero == nullptr ? "is folded" : "stands along " + std::string(up_text(zero->up));
+  return "which axis points up is not sure: the zero pose " + is_so +
+         ", and the trunk points along " + std::string(up_text(other.up)) + " in " +
+         short_text(100 * other.stand, 0) +
          " of 100 frames: if the person stands there, say so (up)";
 }
 
@@ -317,8 +320,8 @@ void Frames::find_up() {
     const Score& other =
         *std::max_element(scores.begin() + 1, scores.end(),
                           [](const Score& a, const Score& b) { return a.stand < b.stand; });
-    const bool is_known = zero != nullptr || is_profile || by_root;
-    if (!is_known && other.stand > 0.3) up_doubt_ = doubt_of(other);
+    const bool is_known = is_profile || (zero == nullptr && by_root) || other.up == up_;
+    if (!is_known && other.stand > 0.3) up_doubt_ = doubt_of(other, zero);
     if (zero != nullptr && zero->up != up_ && !is_profile) {
       up_doubt_ = stands_otherwise(zero->up, "+y is taken, for the clip does not stand");
     }

@@ -195,6 +195,11 @@ rig::Rig recognise(const std::vector<Placed>& joints) {
   return rig::recognise(input);
 }
 
+bool has_note(const rig::Rig& rig, std::string_view part) {
+  return std::ranges::any_of(rig.notes,
+                             [part](const std::string& note) { return note.contains(part); });
+}
+
 std::string joint_of(const rig::Rig& rig, const std::vector<Placed>& joints, Bone bone) {
   const auto at = std::ranges::find(rig.bone, bone);
   return at == rig.bone.end() ? "" : joints[static_cast<std::size_t>(at - rig.bone.begin())].name;
@@ -311,6 +316,7 @@ TEST_CASE("rig: Poser's unit is for Poser's names: others' short legs are a chil
   };
   CHECK(unit_of(3, 1.0, 0.45) == Approx(1.0));
   CHECK(unit_of(2, 2.4384, 1.0) == Approx(2.4384));  // "lShldr"
+  CHECK(unit_of(2, 1.0, 0.55) == Approx(1.0));       // a child, for others write such names too
 }
 
 TEST_CASE("rig: who lies along z in a clip of y up has no floor across z, and is not stood up") {
@@ -318,7 +324,11 @@ TEST_CASE("rig: who lies along z in a clip of y up has no floor across z, and is
   auto& poses = made.input.poses;
   poses.rotation[0] = Eigen::AngleAxisd(85 * kDegree, rig::kX);
   poses.position[0] = Vec(0, 40, 0);
-  CHECK(rig::recognise(made.input).up == UpAxis::kPlusY);
+  const rig::Rig lies = rig::recognise(made.input);
+  CHECK(lies.up == UpAxis::kPlusY);
+  CHECK(has_note(lies, "if the person stands there, say so (up)"));
+  poses.position[0] = Vec::Zero();  // of one who stands in place, the clip shows no floor
+  CHECK(has_note(rig::recognise(made.input), "if the person stands there, say so (up)"));
   poses.position[0] = Vec(0, 40, 90);  // nor is one who stands in a file of z up laid down
   CHECK(rig::recognise(made.input).up == UpAxis::kPlusZ);
 }
@@ -329,6 +339,33 @@ TEST_CASE("rig: end sites of toes that point aside turn no leg") {
     made.input.joints[static_cast<std::size_t>(toes)].end_site = Vec(30, 0, 0);
   }
   CHECK(worst_deg(rig::recognise(made.input), made) < 1.0);
+  made.input.poses = {};
+  for (const double noise : {0.0, 1e-15}) {  // nor where the toes are straight below the ankle
+    for (const Bone toes : {Bone::kLeftToes, Bone::kRightToes}) {
+      made.input.joints[static_cast<std::size_t>(toes)].offset = Vec(noise, -1, -noise);
+    }
+    const rig::Rig rig = rig::recognise(made.input);
+    for (const Bone leg : {Bone::kLeftUpperLeg, Bone::kRightLowerLeg}) {
+      CHECK(std::abs(rig.T[static_cast<std::size_t>(leg)].w()) > 0.9999);
+    }
+  }
+}
+
+TEST_CASE("rig: of hands that are counted the one with fingers is the hand") {
+  auto made = test::make(test::kSchemes[0], ZeroPose::kT, Mat::Identity(), 0.01);
+  made.input.poses = {};
+  auto& joints = made.input.joints;
+  const auto hand = static_cast<int>(Bone::kLeftHand);
+  joints[hand].name = "mixamorig:LeftHand2";
+  add_joints(made, {{.name = "mixamorig:LeftHand1",
+                     .parent = static_cast<int>(Bone::kLeftLowerArm),
+                     .offset = joints[hand].offset,
+                     .end_site = {}},
+                    {.name = "mixamorig:LeftHandIndex1",
+                     .parent = hand,
+                     .offset = Vec(9, 0, 3),
+                     .end_site = {}}});
+  CHECK(rig::recognise(made.input).bone[hand] == Bone::kLeftHand);
 }
 
 TEST_CASE("rig: of toes that are counted the first is the toes") {
@@ -792,18 +829,16 @@ TEST_CASE("rig: without names the shape tells the limbs, and the feet which side
     INFO(bone_name(bone));
     CHECK(rig.bone[static_cast<std::size_t>(bone)] == bone);
   }
-  CHECK(std::ranges::any_of(rig.notes, [](const std::string& note) {
-    return note.find("by shape only") != std::string::npos;
-  }));
+  CHECK(has_note(rig, "by shape only"));
 }
 
 // A person of whom neither names nor feet say which side is left.
-test::Made faceless() {
+test::Made faceless(const Vec& to_toes = Vec::Zero()) {
   auto made = test::make(test::kSchemes[0], ZeroPose::kA, Mat::Identity(), 0.01);
   auto& joints = made.input.joints;
   for (std::size_t j = 0; j < joints.size(); ++j) joints[j].name = "J" + std::to_string(j);
   for (const Bone bone : {Bone::kLeftToes, Bone::kRightToes}) {
-    joints[static_cast<std::size_t>(bone)].offset = Vec::Zero();
+    joints[static_cast<std::size_t>(bone)].offset = to_toes;
   }
   return made;
 }
@@ -834,23 +869,40 @@ TEST_CASE("rig: where neither names nor feet say which side is left, knees and e
   }
 }
 
+TEST_CASE("rig: how limbs bend swaps no limb whose sides the names say") {
+  for (const bool legs_are_named : {false, true}) {
+    auto made = faceless();
+    mirror(made);
+    const int first = static_cast<int>(legs_are_named ? Bone::kLeftUpperLeg : Bone::kLeftShoulder);
+    for (int b = first; b < first + 8; ++b) {
+      made.input.joints[b].name += b < first + 4 ? "_R" : "_L";
+      for (int i = 0; i < made.input.poses.count; ++i) {  // named limbs do not bend
+        made.input.poses.rotation[i * test::kMakerJoints + b].setIdentity();
+      }
+    }
+    const rig::Rig rig = rig::recognise(made.input);
+    INFO((legs_are_named ? "legs" : "arms"));
+    const Bone right = legs_are_named ? Bone::kRightLowerLeg : Bone::kRightLowerArm;
+    CHECK(rig.bone[first + (legs_are_named ? 1 : 2)] == right);
+    CHECK(has_note(rig, "neither names, feet nor bends"));
+  }
+}
+
 TEST_CASE("rig: where neither names, feet nor bends say which side is left, the facing axis does") {
-  auto made = faceless();
-  made.input.poses = {};
-  const auto asks = [](const rig::Rig& rig) {
-    return std::ranges::any_of(rig.notes, [](const std::string& note) {
-      return note.find("facing") != std::string::npos;
-    });
-  };
-  CHECK(asks(rig::recognise(made.input)));
+  const auto asks = [](const rig::Rig& rig) { return has_note(rig, "facing"); };
   const auto left_arm = static_cast<std::size_t>(Bone::kLeftUpperArm);
   const auto right_arm = static_cast<std::size_t>(Bone::kRightUpperArm);
-  for (const bool ahead : {true, false}) {
-    made.input.facing = Vec(0, 0, ahead ? 1 : -1);
-    const rig::Rig rig = rig::recognise(made.input);
-    CHECK_FALSE(asks(rig));
-    CHECK(rig.facing == (ahead ? "+z" : "-z"));
-    CHECK(rig.bone[ahead ? left_arm : right_arm] == Bone::kLeftUpperArm);
+  for (const double below : {0.0, -1.0}) {
+    auto made = faceless(Vec(0, below, 0));
+    made.input.poses = {};
+    CHECK(asks(rig::recognise(made.input)));
+    for (const bool ahead : {true, false}) {
+      made.input.facing = Vec(0, 0, ahead ? 1 : -1);
+      const rig::Rig rig = rig::recognise(made.input);
+      CHECK_FALSE(asks(rig));
+      CHECK(rig.facing == (ahead ? "+z" : "-z"));
+      CHECK(rig.bone[ahead ? left_arm : right_arm] == Bone::kLeftUpperArm);
+    }
   }
 }
 
