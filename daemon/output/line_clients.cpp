@@ -28,8 +28,8 @@ bool has_closed(int fd) noexcept {
 
 }  // namespace
 
-Result<LineClients> LineClients::open(const std::string& listen, std::vector<std::string> peers,
-                                      std::size_t people) {
+Result<LineClients> LineClients::open(const std::string& listen,
+                                      const std::vector<std::string>& peers, std::size_t people) {
   const auto address = TRY(drivers::listen_address(listen, peers, "the clients'"));
   auto allowed = TRY(drivers::Peers::parse(peers));
   const auto fd = TRY(drivers::listen_on(address, listen, kWaiting));

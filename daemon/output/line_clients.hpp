@@ -23,7 +23,7 @@ class LineClients {
   // Listens on an address such as "127.0.0.1:7002"; for port 0 the system chooses one. Beyond
   // loopback `peers` must name the addresses that may connect. `people`: of whom lines go out
   // together. Cold.
-  static Result<LineClients> open(const std::string& listen, std::vector<std::string> peers,
+  static Result<LineClients> open(const std::string& listen, const std::vector<std::string>& peers,
                                   std::size_t people = 1);
   ~LineClients();
   LineClients(LineClients&& other) noexcept;
