@@ -63,7 +63,7 @@ export class CameraPanel {
     this.device.onchange = () => this.#start();
     this.camera = new Camera(this.video, {
       found: (found) => this.#found(found),
-      ended: (sentence) => this.#show(sentence),
+      ended: (sentence) => this.#ended(sentence),
     });
     // Who comes near the button probably wants the camera.
     for (const near of ['pointerenter', 'focusin'])
@@ -94,9 +94,13 @@ export class CameraPanel {
 
   stop(sentence = '') {
     if (!this.camera.running && !this.#starting) return;
+    this.camera.stop(); // also while the browser asks the user
+    this.#ended(sentence);
+  }
+
+  #ended(sentence) {
     this.#starting = null;
     this.button.disabled = this.readOnly !== '';
-    this.camera.stop(); // also while the browser asks the user
     this.#show(sentence);
   }
 
@@ -122,8 +126,7 @@ export class CameraPanel {
       await this.#listDevices();
     } catch (error) {
       if (this.#starting !== start) return;
-      this.camera.stop();
-      this.#show(wordsOf(error));
+      this.stop(wordsOf(error));
     }
     if (this.#starting !== start) return;
     this.#starting = null;

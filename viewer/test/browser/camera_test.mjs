@@ -121,6 +121,26 @@ test('a hand before the camera is sent, until the page may not or is hidden', op
   });
   assert.deepEqual(asked, { running: false, words: 'enough' });
   assert.equal(bridge.landmarks.length, sent);
+  // What finds hands fails while the browser asks, which answers later.
+  const failed = await page.evaluate(async () => {
+    const { camera } = globalThis.posedPage;
+    const { Worker } = globalThis;
+    globalThis.Worker = class extends EventTarget {
+      constructor() {
+        super();
+        setTimeout(() => this.onerror());
+      }
+      terminate() {}
+    };
+    camera.camera.forget();
+    camera.toggle();
+    await new Promise((done) => {
+      setTimeout(done, 2000);
+    });
+    globalThis.Worker = Worker;
+    return { running: camera.camera.running, words: camera.words.textContent };
+  });
+  assert.deepEqual(failed, { running: false, words: 'what finds hands cannot be loaded' });
   // Another camera is chosen while the browser asks, and the first one is refused then.
   await page.evaluate(async () => {
     const { mediaDevices } = navigator;
@@ -143,7 +163,7 @@ test('a hand before the camera is sent, until the page may not or is hidden', op
   bridge.say({ type: 'control', may_control: false, read_only_reason: 'only looking' });
   await page.waitForFunction(() => globalThis.track.readyState === 'ended', undefined, PATIENCE);
   assert.ok(await button(page).isDisabled());
-  assert.equal(loads.length, 2, 'what finds hands stays until the page is hidden');
+  assert.equal(loads.length, 3, 'what finds hands stays until the page is hidden');
   assert.deepEqual(page.foreign, []);
   assert.deepEqual(page.errors, []);
 });
