@@ -56,15 +56,16 @@ std::vector<std::pair<int, double>> between(const std::vector<std::pair<double, 
   return found;
 }
 
-using Turns = std::array<Quaterniond, kMaxJoints>;
+// [taught bone] before and after a change.
+using BoneRotations = std::span<const Quaterniond>;
 
-Quaterniond turn_between(const Turns& before, const Turns& after, int bone) noexcept {
+RT_SAFE Quaterniond turn_between(BoneRotations before, BoneRotations after, int bone) noexcept {
   const auto i = static_cast<std::size_t>(bone);
   return after[i] * before[i].conjugate();
 }
 
-Vector3d turns_by(const std::vector<std::pair<int, double>>& shares, const Turns& before,
-                  const Turns& after) noexcept {
+RT_SAFE Vector3d turns_by(std::span<const std::pair<int, double>> shares, BoneRotations before,
+                          BoneRotations after) noexcept {
   Vector3d sum = Vector3d::Zero();
   for (const auto& [bone, share] : shares) {
     sum += share * rotation_log(turn_between(before, after, bone));
